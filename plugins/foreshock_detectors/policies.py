@@ -1,0 +1,104 @@
+"""First-party policies for A1: the paper's gate alone, and a ladder that begins with cheap, reversible actions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+
+from foreshock.hookspecs import hookimpl
+from foreshock.policy import PolicySpec, Proposal, Situation
+from foreshock.records import ProtectionLevel
+
+__all__ = ["Ladder", "LadderConfig", "PaperGate", "PaperGateConfig"]
+
+PROTOCOLS = ("step-suppression", "arm-reconfiguration", "compliance-tuning", "balance-lock")
+"""The four safety protocols of section 3.3."""
+
+
+class PaperGateConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """mode: the accident mode whose trust gates the protocols."""
+
+    mode: str = "A1"
+
+
+class PaperGate:
+    """All four protocols at T < 0.3 (the protective gate), nothing before: the paper as written."""
+
+    def __init__(self, config: PaperGateConfig) -> None:
+        self._mode = config.mode
+
+    def propose(self, situation: Situation) -> Sequence[Proposal]:
+        """The four protocols at full strength while the mode is at the protective level."""
+        level = situation.levels.get(self._mode, ProtectionLevel.MINIMAL_RISK)
+        if level < ProtectionLevel.PROTECTIVE:
+            return ()
+        return [Proposal(a, 1.0, level, self._mode, f"{self._mode}: T below the protective gate") for a in PROTOCOLS]
+
+
+class LadderConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Settings of the ladder.
+
+    Attributes:
+        mode: the accident mode whose trust gates steps and posture.
+        caution: actions at the caution gate; cheap and reversible ones.
+        protective: actions at the protective gate.
+        full_speed_trust: overall control-level trust from which speed is not scaled.
+        stop_trust: overall control-level trust at which the scale reaches its floor.
+        slowest: the floor of the speed scale.
+    """
+
+    mode: str = "A1"
+    caution: tuple[str, ...] = ("step-suppression",)
+    protective: tuple[str, ...] = PROTOCOLS
+    full_speed_trust: float = 0.75
+    stop_trust: float = 0.3
+    slowest: float = 0.1
+
+
+class Ladder:
+    """Speed scale from overall trust, cheap actions at the caution gate, all protocols at the protective gate."""
+
+    def __init__(self, config: LadderConfig) -> None:
+        self._c = config
+
+    def propose(self, situation: Situation) -> Sequence[Proposal]:
+        """What holds now; the speed scale never rises when trust falls."""
+        c, proposals = self._c, []
+        scale = self.speed(situation.overall)
+        if scale < 1.0:
+            rule = f"speed scaled to {scale:.2f} by overall trust"
+            proposals.append(Proposal("speed-scale", 1.0 - scale, situation.overall_level, "", rule))
+        level = situation.levels.get(c.mode, ProtectionLevel.MINIMAL_RISK)
+        if level >= ProtectionLevel.PROTECTIVE:
+            rule = f"{c.mode}: trust below the protective gate"
+            actions: tuple[str, ...] = (*c.protective, "impact-mitigation")
+        elif level >= ProtectionLevel.CAUTION:
+            rule = f"{c.mode}: trust below the caution gate"
+            actions = c.caution
+        else:
+            return proposals
+        return proposals + [Proposal(a, 1.0, level, c.mode, rule) for a in actions]
+
+    def speed(self, trust: float) -> float:
+        """Share of full speed allowed at this overall trust; NaN gives the floor."""
+        c = self._c
+        if trust >= c.full_speed_trust:
+            return 1.0
+        if not trust > c.stop_trust:
+            return c.slowest
+        return c.slowest + (1.0 - c.slowest) * (trust - c.stop_trust) / (c.full_speed_trust - c.stop_trust)
+
+
+@hookimpl
+def foreshock_policies() -> Sequence[PolicySpec]:
+    """The ladder and the paper's gate."""
+    return [
+        PolicySpec(
+            "ladder",
+            Ladder,
+            LadderConfig,
+            summary="speed scale and step suppression early, all four protocols at T < 0.3",
+        ),
+        PolicySpec("paper-gate", PaperGate, PaperGateConfig, summary="all four protocols at T < 0.3, nothing before"),
+    ]

@@ -1,0 +1,82 @@
+"""Strict reading of TOML into Structs: an unknown key or a wrong type is one error with place, value, nearest name."""
+
+from __future__ import annotations
+
+import tomllib
+import types
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from foreshock.errors import ConfigError, nearest
+
+__all__ = ["convert", "read_toml"]
+
+T = TypeVar("T")
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file.
+
+    Raises:
+        ConfigError: it cannot be read, or is not TOML (with line and column).
+    """
+    try:
+        return tomllib.loads(path.read_text())
+    except OSError as e:
+        siblings = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise ConfigError(str(path), e.strerror or str(e), nearest(path.name, siblings)) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as e:
+        raise ConfigError(str(path), f"not TOML: {e}") from None
+
+
+def convert(data: object, to: type[T], place: str) -> T:
+    """Data as a Struct.
+
+    Raises:
+        ConfigError: names place and key path of the first thing that does not fit.
+    """
+    _refuse_unknown(data, to, place)
+    try:
+        return msgspec.convert(data, to)
+    except msgspec.ValidationError as e:
+        problem, _, path = str(e).partition(" - at ")
+        keys = path.strip("`").removeprefix("$").removeprefix(".")
+        raise ConfigError(f"{place}: {keys}" if keys else place, problem, _offending(data, keys)) from None
+
+
+def _offending(data: object, keys: str) -> str:
+    """The value at a key path, for the message."""
+    for key in keys.replace("[", ".[").split("."):
+        if key.startswith("[") and key[1:-1].isdigit() and isinstance(data, list):
+            data = data[int(key[1:-1])]
+        elif isinstance(data, Mapping) and key in data:
+            data = data[key]
+        else:
+            return ""
+    return f", got {data!r}"
+
+
+def _refuse_unknown(data: object, to: Any, place: str) -> None:
+    origin = typing.get_origin(to)
+    if origin in (typing.Union, types.UnionType):
+        options = [t for t in typing.get_args(to) if t is not type(None)]
+        if len(options) == 1:
+            _refuse_unknown(data, options[0], place)
+    elif isinstance(data, list) and origin in (tuple, list):
+        for k, item in enumerate(data):
+            _refuse_unknown(item, typing.get_args(to)[0], f"{place}[{k}]")
+    elif isinstance(data, Mapping) and isinstance(origin, type) and issubclass(origin, Mapping):
+        for key, item in data.items():
+            _refuse_unknown(item, typing.get_args(to)[1], f"{place}.{key}")
+    elif isinstance(data, Mapping) and isinstance(to, type) and issubclass(to, msgspec.Struct):
+        hints = typing.get_type_hints(to)
+        names = dict(zip(to.__struct_encode_fields__, to.__struct_fields__, strict=True))
+        joint = "." if ":" in place else ": "
+        for key, item in data.items():
+            if key not in names:
+                raise ConfigError(f"{place}{joint}{key}", "unknown key", nearest(key, names))
+            _refuse_unknown(item, hints[names[key]], f"{place}{joint}{key}")

@@ -1,0 +1,185 @@
+"""What a sample can carry: typed messages with ROS 2 names and semantics, otherwise our own.
+
+Vectors are tuples of float, so that a message is immutable and compares by value. Frames follow REP 103 (x forward,
+y left, z up) and REP 105. Quaternions are x, y, z, w.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import msgspec
+
+__all__ = [
+    "Capsule",
+    "Detection",
+    "Detections",
+    "GripState",
+    "Heartbeat",
+    "HumanPose",
+    "Humans",
+    "Imu",
+    "JointState",
+    "Message",
+    "MotionPlan",
+    "Odometry",
+    "Scalar",
+    "Vec3",
+    "WrenchStamped",
+    "is_finite",
+]
+
+Vec3: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+
+
+class Message(msgspec.Struct, frozen=True, tag=True):
+    """Base of all messages."""
+
+
+class Scalar(Message, frozen=True):
+    """One number whose meaning its channel names (std_msgs/Float64)."""
+
+    data: float
+
+
+class JointState(Message, frozen=True):
+    """sensor_msgs/JointState: joint names, positions (rad or m), velocities (1/s), efforts (N m or N); may be empty."""
+
+    name: tuple[str, ...]
+    position: tuple[float, ...]
+    velocity: tuple[float, ...] = ()
+    effort: tuple[float, ...] = ()
+
+
+class Imu(Message, frozen=True):
+    """sensor_msgs/Imu: orientation, angular velocity (rad/s), linear acceleration (m/s^2, gravity included)."""
+
+    orientation: Quaternion
+    angular_velocity: Vec3
+    linear_acceleration: Vec3
+    frame_id: str = "imu_link"
+
+
+class WrenchStamped(Message, frozen=True):
+    """geometry_msgs/WrenchStamped: what the environment exerts on the frame, in that frame: force (N), torque (N m)."""
+
+    force: Vec3
+    torque: Vec3
+    frame_id: str = ""
+
+
+class Odometry(Message, frozen=True):
+    """nav_msgs/Odometry: pose of the child frame in frame_id; twist (m/s, rad/s) in the child frame."""
+
+    position: Vec3
+    orientation: Quaternion
+    linear: Vec3
+    angular: Vec3
+    frame_id: str = "odom"
+    child_frame_id: str = "base_link"
+
+
+class Detection(msgspec.Struct, frozen=True):
+    """vision_msgs/Detection3D with its best hypothesis: track id, class, confidence 0..1, centre and size (m)."""
+
+    id: str
+    class_id: str
+    confidence: float
+    center: Vec3
+    size: Vec3 = (0.0, 0.0, 0.0)
+
+
+class Detections(Message, frozen=True):
+    """vision_msgs/Detection3DArray."""
+
+    detections: tuple[Detection, ...]
+    frame_id: str = "odom"
+
+
+class Capsule(msgspec.Struct, frozen=True):
+    """A body segment: all points within radius (m) of the segment from a to b (m).
+
+    region is a body region of ISO/TS 15066 Annex A, e.g. ``chest``.
+    """
+
+    region: str
+    a: Vec3
+    b: Vec3
+    radius: float
+
+
+class HumanPose(msgspec.Struct, frozen=True):
+    """One tracked human as capsules, with the velocity of the trunk (m/s) if it is measured.
+
+    uncertainty is the standard position uncertainty Z_d of ISO/TS 15066 in m.
+    """
+
+    id: str
+    capsules: tuple[Capsule, ...]
+    velocity: Vec3 | None = None
+    uncertainty: float = 0.0
+
+
+class Humans(Message, frozen=True):
+    """Every human that perception sees now; an empty tuple says that nobody is there."""
+
+    humans: tuple[HumanPose, ...]
+    frame_id: str = "odom"
+
+
+class GripState(Message, frozen=True):
+    """A gripper: closed or not, measured normal and tangential force (N), opening (m), commanded normal force (N).
+
+    object_mass is the mass that the planner assumes for the held object (kg); 0 when nothing is held.
+    """
+
+    grasping: bool
+    normal_force: float
+    tangential_force: float
+    opening: float
+    commanded_force: float
+    object_mass: float = 0.0
+    vertical_acceleration: float = 0.0
+
+
+class Heartbeat(Message, frozen=True):
+    """Sign of life of a sender: its sequence number and the round trip of its control loop (s), if it measures one."""
+
+    sequence: int
+    round_trip_s: float = 0.0
+
+
+class MotionPlan(Message, frozen=True):
+    """What the robot's own control intends.
+
+    com: planned centre of mass relative to the midpoint of the soles (m), axes of the base footprint.
+    support: soles that the plan loads now, of ``left`` and ``right``.
+    speed: planned speed of travel (m/s).
+    """
+
+    com: Vec3
+    support: tuple[str, ...]
+    speed: float = 0.0
+
+
+AnyMessage: TypeAlias = (
+    Scalar | JointState | Imu | WrenchStamped | Odometry | Detections | Humans | GripState | Heartbeat | MotionPlan
+)
+
+
+def is_finite(value: object) -> bool:
+    """Whether every number in a message is finite; ints, strings, None and booleans always are."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, tuple):
+        try:
+            return (
+                math.isfinite(math.fsum(value)) if value and isinstance(value[0], float) else all(map(is_finite, value))
+            )
+        except (OverflowError, ValueError, TypeError):
+            return False
+    if isinstance(value, msgspec.Struct):
+        return all(is_finite(getattr(value, f)) for f in value.__struct_fields__)
+    return True

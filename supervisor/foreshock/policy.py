@@ -1,0 +1,239 @@
+"""The policy port, the actions, and the arbiter that merges what policies propose.
+
+A policy turns protection levels into proposals; the arbiter chooses what is feasible before the predicted accident
+(rule 6: stop is not always safe), resolves conflicts per resource, and lets released actions ramp down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+import msgspec
+
+from foreshock.records import Intervention, Precursor, ProtectionLevel
+
+__all__ = ["ACTIONS", "ActionSpec", "Arbiter", "ArbiterState", "Policy", "PolicySpec", "Proposal", "Situation"]
+
+
+class ActionSpec(msgspec.Struct, frozen=True):
+    """What an action is.
+
+    Attributes:
+        id: kebab-case id.
+        title: for people.
+        resources: what it takes hold of; of two proposals for one resource the arbiter keeps one.
+        duration_s: how long it takes until it helps; of a mitigation, how long before the accident it must begin.
+        may_worsen: precursor kinds in whose presence it may make things worse.
+        mitigates: it softens the accident instead of preventing it.
+        source: where it comes from.
+    """
+
+    id: str
+    title: str
+    resources: tuple[str, ...]
+    duration_s: float
+    may_worsen: tuple[str, ...] = ()
+    mitigates: bool = False
+    source: str = ""
+
+
+PAPER = "section 3.3, safety protocols at T < 0.3"
+ACTIONS: Mapping[str, ActionSpec] = {
+    a.id: a
+    for a in (
+        ActionSpec("speed-scale", "scale speed and force down", ("speed",), 0.0, source="ISO 10218-1 reduced speed"),
+        ActionSpec("step-suppression", "halt the next planned step", ("steps",), 0.15, source=PAPER),
+        ActionSpec("arm-reconfiguration", "extend the arms for counter-torque", ("arms",), 0.3, source=PAPER),
+        ActionSpec(
+            "compliance-tuning",
+            "more joint damping and foot contact stiffness",
+            ("joint-damping",),
+            0.02,
+            may_worsen=("foot-micro-slip",),
+            source=PAPER,
+        ),
+        ActionSpec("balance-lock", "power-assisted balance lock", ("balance",), 0.05, source=PAPER),
+        ActionSpec("minimal-risk", "go to the minimal risk condition", ("motion",), 0.2, source="ISO 22737, ISO 34501"),
+        ActionSpec(
+            "impact-mitigation",
+            "soften the impact, away from the human",
+            ("arms", "legs"),
+            0.25,
+            mitigates=True,
+            source="design rule 6",
+        ),
+    )
+}
+"""Actions that the core knows; a policy may bring its own."""
+
+
+class Situation(msgspec.Struct, frozen=True):
+    """What a policy sees.
+
+    Attributes:
+        now_ns: time of the tick.
+        levels: protection level per accident mode.
+        trust: control-level trust per accident mode.
+        overall: control-level trust overall.
+        overall_level: protection level from overall trust and from lost evidence.
+        precursors: evidence inside the window.
+        time_to_event_s: shortest predicted time to an accident, None if none is predicted.
+    """
+
+    now_ns: int
+    levels: Mapping[str, ProtectionLevel]
+    trust: Mapping[str, float]
+    overall: float
+    overall_level: ProtectionLevel
+    precursors: Sequence[Precursor]
+    time_to_event_s: float | None
+
+
+class Proposal(msgspec.Struct, frozen=True):
+    """An action that a policy wants: strength 0..1, for which mode, at which level, by which rule."""
+
+    action: str
+    strength: float
+    level: ProtectionLevel
+    mode: str = ""
+    rule: str = ""
+
+
+class Policy(Protocol):
+    """Maps a situation to proposals; a pure function."""
+
+    def propose(self, situation: Situation) -> Sequence[Proposal]:
+        """The actions that should hold now."""
+
+
+class PolicySpec(msgspec.Struct, frozen=True):
+    """What a policy declares: id, the actions that it may propose beyond ACTIONS, config Struct, build, one line."""
+
+    id: str
+    build: Callable[[Any], Policy]
+    config: type[msgspec.Struct]
+    actions: tuple[ActionSpec, ...] = ()
+    summary: str = ""
+
+
+class ArbiterState(msgspec.Struct, frozen=True):
+    """What the arbiter has seen: actions that hold, since when each was engaged, and how far each is released.
+
+    releasing maps an action to the tick that released it and its strength then.
+    """
+
+    active: Mapping[str, Intervention] = {}
+    engaged_ns: Mapping[str, int] = {}
+    releasing: Mapping[str, tuple[int, float]] = {}
+
+
+UNCONDITIONAL = frozenset({"speed-scale", "minimal-risk"})
+
+
+class Arbiter:
+    """Merges proposals into interventions.
+
+    Args:
+        actions: every action that may be proposed, by id.
+        release_s: a released action ramps to zero over this time, since an abrupt restart is itself a precursor.
+        step: a changed strength is announced when it moved by this much.
+    """
+
+    def __init__(self, actions: Mapping[str, ActionSpec], release_s: float, step: float = 0.05) -> None:
+        self.actions = actions
+        self._release_ns = round(release_s * 1e9)
+        self._step = step
+
+    def remaining_s(self, state: ArbiterState, action: str, now_ns: int) -> float:
+        """Time until an action helps; what is already engaged is on its way."""
+        since = state.engaged_ns.get(action, now_ns)
+        return max(0.0, self.actions[action].duration_s - (now_ns - since) / 1e9)
+
+    def feasible(
+        self, state: ArbiterState, proposals: Sequence[Proposal], now_ns: int, time_to_event_s: float | None
+    ) -> list[Proposal]:
+        """Proposals that help before the predicted accident.
+
+        An engaged action is kept. A mitigation stands only when nothing new can prevent the accident any more and no
+        more time is left than the mitigation itself needs.
+        """
+        if time_to_event_s is None:
+            return [p for p in proposals if not self.actions[p.action].mitigates]
+        prevent = [p for p in proposals if not self.actions[p.action].mitigates]
+        keep = [
+            p
+            for p in prevent
+            if p.action in UNCONDITIONAL
+            or p.action in state.engaged_ns
+            or self.remaining_s(state, p.action, now_ns) <= time_to_event_s
+        ]
+        hope = any(
+            p.action not in UNCONDITIONAL and 0.0 < self.remaining_s(state, p.action, now_ns) <= time_to_event_s
+            for p in keep
+        )
+        if not hope:
+            keep += [
+                p
+                for p in proposals
+                if self.actions[p.action].mitigates and time_to_event_s <= self.actions[p.action].duration_s
+            ]
+        return keep
+
+    def choose(self, proposals: Sequence[Proposal], present: frozenset[str]) -> list[Proposal]:
+        """One proposal per resource: mitigation, then level, then not worsening a present kind, then strength, id."""
+
+        def rank(p: Proposal) -> tuple[bool, int, bool, float, str]:
+            spec = self.actions[p.action]
+            return (not spec.mitigates, -p.level, not present.isdisjoint(spec.may_worsen), -p.strength, p.action)
+
+        taken: set[str] = set()
+        chosen: list[Proposal] = []
+        for p in sorted(proposals, key=rank):
+            resources = self.actions[p.action].resources
+            if taken.isdisjoint(resources):
+                taken.update(resources)
+                chosen.append(p)
+        return chosen
+
+    def step(
+        self, state: ArbiterState, situation: Situation, proposals: Sequence[Proposal]
+    ) -> tuple[ArbiterState, tuple[Intervention, ...], tuple[Intervention, ...]]:
+        """Next state, the interventions that hold, and those that the robot must be told of now."""
+        if not proposals and not state.active:
+            return state, (), ()
+        now = situation.now_ns
+        present = frozenset(p.kind for p in situation.precursors if p.phase != "cleared")
+        feasible = self.feasible(state, proposals, now, situation.time_to_event_s)
+        seen = tuple(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in situation.precursors)
+        active: dict[str, Intervention] = {}
+        engaged: dict[str, int] = {}
+        changes: list[Intervention] = []
+        for p in self.choose(feasible, present):
+            held = state.active.get(p.action)
+            if held is None or p.action in state.releasing or self._moved(held.strength, p.strength):
+                held = Intervention(now, p.action, p.strength, p.mode, (p.rule, *seen))
+                changes.append(held)
+            active[p.action] = held
+            engaged[p.action] = state.engaged_ns.get(p.action, now)
+        releasing: dict[str, tuple[int, float]] = {}
+        for action, held in state.active.items():
+            if action in active:
+                continue
+            since, full = state.releasing.get(action, (now, held.strength))
+            gone = (now - since) / self._release_ns if self._release_ns else 1.0
+            left = full * (1.0 - gone)
+            if left <= 0.0:
+                changes.append(Intervention(now, action, 0.0, held.mode, ("released",)))
+                continue
+            releasing[action] = (since, full)
+            if self._moved(held.strength, left):
+                held = Intervention(now, action, left, held.mode, ("release ramp",))
+                changes.append(held)
+            active[action] = held
+            engaged[action] = state.engaged_ns.get(action, now)
+        held_now = tuple(active[a] for a in sorted(active))
+        return ArbiterState(active, engaged, releasing), held_now, tuple(sorted(changes, key=lambda i: i.action))
+
+    def _moved(self, old: float, new: float) -> bool:
+        return abs(new - old) >= self._step or (new != old and new in (0.0, 1.0))

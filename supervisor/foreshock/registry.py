@@ -1,0 +1,166 @@
+"""Finds plugins by entry point and loads only those that the configuration names.
+
+The name of an entry point of group ``foreshock`` is the id of the detector, policy or twin behind it; its value is the
+module with the hook implementations.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata as md
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol, TypeVar
+
+import msgspec
+import pluggy
+
+from foreshock import hookspecs
+from foreshock.detector import DetectorSpec
+from foreshock.errors import ConfigError, ForeshockError, PluginError, nearest
+from foreshock.hookspecs import GROUP
+from foreshock.policy import PolicySpec
+from foreshock.taxonomy import PrecursorKind
+from foreshock.twin import TwinSpec
+
+__all__ = ["Broken", "Registry"]
+
+
+class _Named(Protocol):
+    @property
+    def id(self) -> str: ...
+
+
+T = TypeVar("T", bound=_Named)
+
+
+class Broken(msgspec.Struct, frozen=True):
+    """A plugin that could not be loaded, and why."""
+
+    name: str
+    reason: str
+
+
+class Registry:
+    """The plugins of this environment.
+
+    Args:
+        modules: further plugin modules by name, beside the installed ones; for tests and embedding.
+    """
+
+    def __init__(self, modules: Mapping[str, Any] | None = None) -> None:
+        self._manager = pluggy.PluginManager(GROUP)
+        self._manager.add_hookspecs(hookspecs)
+        self._points = {e.name: e for e in md.entry_points(group=GROUP)}
+        self._extra = dict(modules or {})
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all installed plugins, loaded or not."""
+        return tuple(sorted({*self._points, *self._extra}))
+
+    def load(self, name: str, place: str = "plugins") -> None:
+        """Import a plugin and check its hooks.
+
+        Raises:
+            ConfigError: nobody offers that name.
+            PluginError: its import fails, or it implements a hook that does not exist.
+        """
+        if self._manager.has_plugin(name):
+            return
+        if name not in self.names:
+            raise ConfigError(place, f"no plugin {name!r} is installed", nearest(name, self.names))
+        try:
+            module = self._extra[name] if name in self._extra else self._points[name].load()
+        except Exception as e:
+            raise PluginError(f"plugin {name}", f"import failed: {type(e).__name__}: {e}") from e
+        if any(p is module for p in self._manager.get_plugins()):
+            return
+        self._manager.register(module, name)
+        self._refuse_unknown_hooks(name, module)
+        try:
+            self._manager.check_pending()
+        except pluggy.PluginValidationError as e:
+            self._manager.unregister(name=name)
+            raise PluginError(f"plugin {name}", str(e)) from e
+
+    def load_all(self) -> tuple[Broken, ...]:
+        """Import every plugin; those that cannot be loaded."""
+        broken = []
+        for name in self.names:
+            try:
+                self.load(name)
+            except ForeshockError as e:
+                broken.append(Broken(name, str(e)))
+        return tuple(broken)
+
+    def detector(self, id_: str, place: str) -> DetectorSpec:
+        """The detector with this id, loading the plugin of that name."""
+        self.load(id_, place)
+        return _pick(self.detectors(), id_, place, "detector")
+
+    def policy(self, id_: str, place: str) -> PolicySpec:
+        """The policy with this id, loading the plugin of that name."""
+        self.load(id_, place)
+        return _pick(self.policies(), id_, place, "policy")
+
+    def twin(self, id_: str, place: str) -> TwinSpec:
+        """The kind of twin with this id, loading the plugin of that name."""
+        self.load(id_, place)
+        return _pick(self.twins(), id_, place, "kind of twin")
+
+    def detectors(self) -> tuple[DetectorSpec, ...]:
+        """Detectors of the loaded plugins, by id."""
+        return self._sorted("foreshock_detectors", DetectorSpec)
+
+    def policies(self) -> tuple[PolicySpec, ...]:
+        """Policies of the loaded plugins, by id."""
+        return self._sorted("foreshock_policies", PolicySpec)
+
+    def twins(self) -> tuple[TwinSpec, ...]:
+        """Kinds of twin of the loaded plugins, by id."""
+        return self._sorted("foreshock_twins", TwinSpec)
+
+    def precursors(self) -> tuple[PrecursorKind, ...]:
+        """Precursor kinds with which the loaded plugins extend the taxonomy, by id."""
+        return self._sorted("foreshock_precursors", PrecursorKind)
+
+    def scenarios(self) -> tuple[Path, ...]:
+        """Scenario files of the loaded plugins, sorted."""
+        return tuple(sorted(path for _, path in self._call("foreshock_scenarios", Path)))
+
+    def _call(self, hook: str, of: type) -> Iterable[tuple[str, Any]]:
+        """What each plugin's implementation gives; called one by one, since pluggy stops at the first that raises."""
+        for impl in getattr(self._manager.hook, hook).get_hookimpls():
+            try:
+                given = tuple(impl.function())
+            except Exception as e:
+                raise PluginError(f"plugin {impl.plugin_name}", f"{hook} raised {type(e).__name__}: {e}") from e
+            for item in given:
+                if not isinstance(item, of):
+                    raise PluginError(
+                        f"plugin {impl.plugin_name}", f"{hook} gave a {type(item).__name__}, {of.__name__} is expected"
+                    )
+                yield impl.plugin_name, item
+
+    def _sorted(self, hook: str, of: type) -> tuple[Any, ...]:
+        found: dict[str, tuple[str, Any]] = {}
+        for plugin, item in self._call(hook, of):
+            if item.id in found:
+                raise PluginError(f"plugin {plugin}", f"{hook}: id {item.id!r} is taken by plugin {found[item.id][0]}")
+            found[item.id] = (plugin, item)
+        return tuple(found[id_][1] for id_ in sorted(found))
+
+    def _refuse_unknown_hooks(self, name: str, module: ModuleType) -> None:
+        known = {h for h in vars(hookspecs) if h.startswith("foreshock_")}
+        for attr in vars(module):
+            if attr.startswith("foreshock_") and attr not in known and callable(getattr(module, attr)):
+                self._manager.unregister(name=name)
+                raise PluginError(f"plugin {name}", f"unknown hook {attr!r}", nearest(attr, known))
+
+
+def _pick(specs: Iterable[T], id_: str, place: str, what: str) -> T:
+    found = {s.id: s for s in specs}
+    if id_ not in found:
+        raise ConfigError(place, f"plugin {id_!r} offers no {what} {id_!r}", nearest(id_, found))
+    return found[id_]

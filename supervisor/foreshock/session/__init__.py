@@ -1,0 +1,1 @@
+"""Runs: a twin and a supervisor together, in this process or a watched one."""

@@ -1,0 +1,170 @@
+"""Runs in watched child processes: a hang, a crash or an error of one run is classified and costs no other run.
+
+Plant and supervisor run together in one worker (a pipe per step would cost more than the step), which keeps both and
+reuses them by reset. Everything temporary lies in one scratch folder that the parent removes.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import TimeoutError as FutureTimeout
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from pebble import ProcessExpired, ProcessPool
+
+from foreshock._strict import convert
+from foreshock.errors import TwinError
+from foreshock.registry import Registry
+from foreshock.session.run import Arm, Run
+from foreshock.session.scenario import Scenario
+from foreshock.session.simulate import simulate
+from foreshock.supervisor import Supervisor
+from foreshock.twin import Twin
+
+__all__ = ["Failure", "Job", "build_twin", "run_all", "run_one"]
+
+
+class Job(msgspec.Struct, frozen=True):
+    """One run to do."""
+
+    scenario: Scenario
+    arm: Arm
+    seed: int
+    detail: bool = True
+
+
+class Failure(msgspec.Struct, frozen=True):
+    """A run that gave no result: kind as in TwinError, and what was said."""
+
+    job: Job
+    kind: str
+    detail: str
+    log: str = ""
+
+
+def build_twin(scenario: Scenario, registry: Registry, scratch: Path) -> Twin:
+    """The twin that a scenario names, with its files in scratch."""
+    place = f"{scenario.id}: twin"
+    spec = registry.twin(scenario.twin["kind"], f"{place}.kind")
+    table = {k: v for k, v in scenario.twin.items() if k != "kind"}
+    for key in ("fmu", "binding"):
+        if isinstance(table.get(key), str) and table[key]:
+            table[key] = str(Path(scenario.folder) / table[key])
+    scratch.mkdir(parents=True, exist_ok=True)
+    return spec.build(convert(table, spec.config, place), scenario.supervisor().supervisor.robot, scratch)
+
+
+_BENCH: dict[bytes, Any] = {}
+"""Twins and supervisors that this worker has built, by what they were built from."""
+
+
+def _work(job: Job, scratch: str) -> Run:
+    """In the worker: do one run, reusing what was built for the same twin and configuration."""
+    registry: Registry = _BENCH.setdefault(b"registry", Registry())
+    twin_key = msgspec.json.encode(("twin", job.scenario.twin, job.scenario.folder), order="sorted")
+    if twin_key not in _BENCH:
+        folder = Path(scratch) / f"worker-{os.getpid()}-{len(_BENCH)}"
+        _BENCH[twin_key] = build_twin(job.scenario, registry, folder)
+    judge: Supervisor | None = None
+    if job.arm != "off":
+        key = msgspec.json.encode(("supervisor", job.scenario.config), order="sorted")
+        if key not in _BENCH:
+            _BENCH[key] = Supervisor(job.scenario.supervisor(), Path(job.scenario.folder), registry)
+        judge = _BENCH[key]
+    try:
+        return simulate(job.scenario, _BENCH[twin_key], judge, job.arm, job.seed, detail=job.detail)
+    except TwinError:
+        _BENCH.pop(twin_key).close()
+        raise
+
+
+def _quiet(scratch: str) -> None:
+    """Worker start: what native code prints goes to a file, not into the results."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.stdout.flush()
+    fd = os.open(Path(scratch) / f"output-{os.getpid()}.log", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
+    os.dup2(fd, 1)
+    os.dup2(fd, 2)
+    os.close(fd)
+
+
+@contextmanager
+def _scratch() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="foreshock-", ignore_cleanup_errors=True) as name:
+        yield Path(name)
+
+
+def run_all(
+    jobs: Sequence[Job],
+    workers: int = 1,
+    timeout_s: float = 120.0,
+    done: Callable[[int, Run | Failure], None] | None = None,
+) -> list[Run | Failure]:
+    """Do all jobs; results in their order.
+
+    Args:
+        jobs: what to run.
+        workers: number of processes.
+        timeout_s: wall-clock limit of one run; beyond it the worker is killed.
+        done: told of each result as it comes, with its index.
+
+    Raises:
+        BadInputError: a job names something that does not exist: every job of its kind would fail.
+    """
+    results: list[Run | Failure] = []
+    with _scratch() as scratch:
+        pool = ProcessPool(
+            max_workers=workers, context=get_context("spawn"), initializer=_quiet, initargs=[str(scratch)]
+        )
+        try:
+            futures = [pool.schedule(_work, args=[job, str(scratch)], timeout=timeout_s) for job in jobs]
+            for k, (job, future) in enumerate(zip(jobs, futures, strict=True)):
+                result = _result(job, future, timeout_s, scratch)
+                results.append(result)
+                if done is not None:
+                    done(k, result)
+            pool.close()  # type: ignore[no-untyped-call]  # pebble has no types
+        finally:
+            pool.stop()  # type: ignore[no-untyped-call]  # as above
+            pool.join()
+    return results
+
+
+def _result(job: Job, future: Any, timeout_s: float, scratch: Path) -> Run | Failure:
+    try:
+        run: Run = future.result()
+    except FutureTimeout:
+        return Failure(job, "hang", f"no result within {timeout_s:g} s; killed", _last_words(scratch))
+    except ProcessExpired as e:
+        code = e.exitcode
+        how = signal.Signals(-code).name if isinstance(code, int) and code < 0 else f"exit code {code}"
+        return Failure(job, "crash", f"the process of the twin ended by {how}", _last_words(scratch))
+    except TwinError as e:
+        return Failure(job, e.kind, e.detail, e.log)
+    return run
+
+
+def _last_words(scratch: Path, most: int = 4000) -> str:
+    """The end of the newest logs in scratch."""
+    logs = sorted(scratch.rglob("*.log"), key=lambda p: p.stat().st_mtime)
+    return "\n".join(text for p in logs[-3:] if (text := p.read_text(errors="replace")[-most:].strip()))
+
+
+def run_one(job: Job, timeout_s: float = 120.0) -> Run:
+    """Do one job in a watched process.
+
+    Raises:
+        TwinError: the run gave no result, classified.
+    """
+    result = run_all([job], 1, timeout_s)[0]
+    if isinstance(result, Failure):
+        raise TwinError(result.kind, result.detail, result.log)
+    return result

@@ -1,0 +1,205 @@
+"""A stepped run: twin and supervisor in lockstep on simulated time. Nothing here reads a clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from foreshock.clock import NS_PER_S, ns, seconds
+from foreshock.errors import ConfigError
+from foreshock.journal import DigestJournal, Journal
+from foreshock.records import Decision, Health, Intervention, ProtectionLevel
+from foreshock.session.run import Arm, Run, TimelineRow
+from foreshock.session.scenario import Scenario
+from foreshock.supervisor import Supervisor
+from foreshock.twin import Twin, TwinEvent
+
+__all__ = ["simulate"]
+
+AFTERMATH_S = 0.5
+"""A run goes on for this long after the accident, so that its peak force is seen."""
+
+
+def simulate(
+    scenario: Scenario,
+    twin: Twin,
+    supervisor: Supervisor | None,
+    arm: Arm,
+    seed: int,
+    *,
+    detail: bool = True,
+    journals: Sequence[Journal] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Run a scenario.
+
+    Args:
+        scenario: what to run.
+        twin: where.
+        supervisor: who judges; None if the arm is ``off``.
+        arm: on (judges and acts), shadow (judges), off.
+        seed: of all randomness in the twin and the detectors.
+        detail: keep timeline, series and digest.
+        journals: further records of every tick.
+        progress: told the simulated time in s now and then.
+
+    Raises:
+        TwinError: the twin failed.
+        ConfigError: the periods of twin and supervisor do not fit.
+    """
+    judge = supervisor if arm != "off" else None
+    if judge is None and arm != "off":
+        raise ConfigError(scenario.id, f"arm {arm!r} needs a supervisor")
+    period = judge.period_ns if judge is not None else twin.period_ns
+    if period % twin.period_ns:
+        raise ConfigError(
+            f"{scenario.id}: config.supervisor.period_s",
+            f"{seconds(period):g} s is not a multiple of the twin's step of {seconds(twin.period_ns):g} s",
+        )
+    twin.reset(scenario.parameters, seed)
+    if judge is not None:
+        judge.reset(seed)
+    digest = DigestJournal()
+    recorders = (digest, *journals) if detail else tuple(journals)
+    tied = judge.taxonomy.kinds_of(scenario.mode) if judge is not None else frozenset()
+    log = _Log(scenario.mode, tied, detail)
+    now, end, stop = 0, ns(scenario.duration_s), None
+    told = 0
+    ignored: set[str] = set()
+    while now < end and (stop is None or now < stop):
+        now += period
+        samples = twin.advance(now)
+        events = twin.events()
+        decision = None
+        if judge is not None:
+            decision = judge.step(samples, now)
+            for recorder in recorders:
+                recorder.tick(samples, decision)
+            if arm == "on":
+                for change in decision.changes:
+                    if change.action in twin.actions:
+                        twin.intervene(change)
+                    else:
+                        ignored.add(change.action)
+        log.tick(now, decision, events, twin)
+        if stop is None and any(e.mode == scenario.mode for e in events):
+            stop = now + ns(AFTERMATH_S)
+        if progress is not None and now - told >= NS_PER_S // 4:
+            told = now
+            progress(seconds(now))
+    events = tuple(twin.events())
+    accidents = [e for e in events if e.mode == scenario.mode]
+    outcome = accidents[0].id if accidents else events[0].id if events else "none"
+    policies = "+".join(p.use for p in judge.config.policies) if judge is not None else ""
+    return Run(
+        scenario.id,
+        scenario.mode,
+        arm,
+        policies,
+        seed,
+        dict(scenario.parameters),
+        bool(accidents),
+        outcome,
+        events,
+        seconds(now),
+        log.first_s,
+        log.gate_s,
+        tuple(log.interventions),
+        tuple(sorted(ignored)),
+        tuple(log.health),
+        tuple(log.rows),
+        log.series,
+        digest.digest if detail and judge is not None else "",
+        log.max_level,
+    )
+
+
+class _Log:
+    """Collects what a Run keeps."""
+
+    def __init__(self, mode: str, tied: frozenset[str], detail: bool) -> None:
+        self._mode, self._tied, self._detail = mode, tied, detail
+        self._before: tuple[object, ...] = ()
+        self._known: frozenset[str] = frozenset()
+        self._events = 0
+        self.first_s: dict[str, float] = {}
+        self.gate_s: dict[str, float] = {}
+        self.interventions: list[Intervention] = []
+        self.health: list[Health] = []
+        self.rows: list[TimelineRow] = []
+        self.series: dict[str, list[float]] = {}
+        self.max_level = 0
+
+    def tick(self, now_ns: int, decision: Decision | None, events: Sequence[TwinEvent], twin: Twin) -> None:
+        """Take one tick."""
+        t = seconds(now_ns)
+        news = tuple(f"{e.id} ({e.value:.0f} {e.unit})" if e.limit else e.id for e in events[self._events :])
+        self._events = len(events)
+        if decision is not None:
+            self._judged(t, decision, news)
+        elif news and self._detail:
+            nan = math.nan
+            self.rows.append(TimelineRow(t, (), nan, nan, nan, nan, nan, "", (), news))
+        if self._detail:
+            self._sample(t, decision, twin)
+
+    def _judged(self, t: float, d: Decision, news: tuple[str, ...]) -> None:
+        mode = self._mode
+        self.interventions += d.changes
+        self.health += d.health
+        self.max_level = max(self.max_level, d.level)
+        level = d.levels[mode]
+        for gate in (ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE):
+            if level >= gate and gate.name.lower() not in self.gate_s:
+                self.gate_s[gate.name.lower()] = t
+        mine = [p for p in d.precursors if p.kind in self._tied]
+        for p in mine:
+            if p.kind not in self.first_s:
+                self.first_s[p.kind] = t
+        if not self._detail:
+            return
+        names = frozenset(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in mine)
+        m, q = d.risk.counts[mode]
+        changed = tuple(f"{i.action} {i.strength:.2f}" for i in d.changes if _worth_a_row(i))
+        state = (names, m, q, d.level)
+        if state != self._before or changed or news:
+            shown = tuple(sorted(n if n in self._known else f"+{n}" for n in names))
+            trust, control = d.trust.by_mode[mode], d.trust.control_by_mode[mode]
+            p_mode = d.risk.by_mode[mode]
+            self.rows.append(TimelineRow(t, shown, m, q, p_mode, trust, control, d.level.name.lower(), changed, news))
+        self._before, self._known = state, names
+
+    def _sample(self, t: float, d: Decision | None, twin: Twin) -> None:
+        row: dict[str, float] = {"t_s": t}
+        if d is not None:
+            mode = self._mode
+            m, q = d.risk.counts[mode]
+            row |= {
+                "p": d.risk.by_mode[mode],
+                "trust": d.trust.by_mode[mode],
+                "control_trust": d.trust.control_by_mode[mode],
+                "p_overall": d.risk.probability,
+                "m": m,
+                "q": q,
+                "level": float(d.level),
+                "time_to_event_s": math.nan if d.time_to_event_s is None else d.time_to_event_s,
+            }
+            for i in d.indications:
+                name = f"{i.kind}@{i.subject}" if i.subject else i.kind
+                row[f"stat:{name}"], row[f"threshold:{name}"] = i.statistic, i.threshold
+                for measure, value in i.measures.items():
+                    row[f"seen:{measure}"] = value
+            for v in d.interventions:
+                row[f"action:{v.action}"] = v.strength
+        row |= {f"true:{k}": v for k, v in twin.probes().items()}
+        length = len(self.series.get("t_s", ()))
+        for key, value in row.items():
+            self.series.setdefault(key, [math.nan] * length).append(value)
+        for column in self.series.values():
+            if len(column) <= length:
+                column.append(math.nan)
+
+
+def _worth_a_row(change: Intervention) -> bool:
+    """Beginnings and ends; not every step of a ramp or scale."""
+    return change.reasons[:1] != ("release ramp",) and change.action != "speed-scale"

@@ -1,0 +1,182 @@
+"""The supervisor: a configuration made into a pipeline, stepped with samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+
+from foreshock._strict import convert
+from foreshock.clock import NS_PER_S
+from foreshock.config import Config, DetectorEntry, load_config
+from foreshock.containment import Contained
+from foreshock.detector import Detector, DetectorSpec, Input
+from foreshock.errors import BadInputError, ConfigError, ForeshockError, MissingExtraError, PluginError, nearest
+from foreshock.isolation import ChildDetector
+from foreshock.pipeline import Pipeline, State
+from foreshock.policy import ACTIONS, Arbiter
+from foreshock.records import Decision, Lease, ProtectionLevel, Sample
+from foreshock.registry import Registry
+from foreshock.risk import IndependentRisk
+from foreshock.taxonomy import Taxonomy, builtin_taxonomy
+from foreshock.trust import LevelState, TrustModel
+
+__all__ = ["OperatorReset", "Supervisor", "build_detector"]
+
+
+class OperatorReset(msgspec.Struct, frozen=True):
+    """An operator's release of latched protection levels: when, who and why."""
+
+    stamp_ns: int
+    who: str
+    why: str
+
+
+class Supervisor:
+    """Judges a robot's samples tick by tick. It supervises; it never replaces low-level control.
+
+    Args:
+        config: what to run.
+        base: folder that relative paths of the configuration start from.
+        registry: where plugins are looked up; the installed ones by default.
+
+    Raises:
+        BadInputError: the configuration names something that does not exist or does not fit.
+    """
+
+    def __init__(self, config: Config, base: Path | None = None, registry: Registry | None = None) -> None:
+        self.config = config
+        registry = registry or Registry()
+        specs = [registry.detector(d.use, f"detectors[{k}].use") for k, d in enumerate(config.detectors)]
+        policies = [registry.policy(p.use, f"policies[{k}].use") for k, p in enumerate(config.policies)]
+        taxonomy = builtin_taxonomy().extended(registry.precursors())
+        if config.supervisor.taxonomy:
+            taxonomy = taxonomy.extended_from((base or Path()) / config.supervisor.taxonomy)
+        self.taxonomy = taxonomy
+        contained = [
+            contain(spec, entry, f"detectors[{k}]", config.supervisor.robot, taxonomy)
+            for k, (spec, entry) in enumerate(zip(specs, config.detectors, strict=True))
+        ]
+        contained.sort(key=lambda c: c.spec.id)
+        actions = {**ACTIONS, **{a.id: a for p in policies for a in p.actions}}
+        self._pipeline = Pipeline(
+            contained,
+            config.window,
+            IndependentRisk(config.risk, taxonomy),
+            TrustModel(config.trust, taxonomy, {k for c in contained for k in c.kinds}),
+            config.gates,
+            [
+                p.build(convert(entry.config, p.config, f"policies[{k}].config"))
+                for k, (p, entry) in enumerate(zip(policies, config.policies, strict=True))
+            ],
+            Arbiter(actions, config.supervisor.release_s),
+            taxonomy.codes,
+        )
+        self.period_ns = round(config.supervisor.period_s * NS_PER_S)
+        self.resets: list[OperatorReset] = []
+        self._state = State()
+        self._epoch = 0
+        self._may_move = False
+        self.reset(0)
+
+    @classmethod
+    def from_file(cls, path: Path, registry: Registry | None = None) -> Supervisor:
+        """The supervisor that a TOML file describes."""
+        return cls(load_config(path), path.parent, registry)
+
+    @property
+    def detectors(self) -> tuple[DetectorSpec, ...]:
+        """Specs of the detectors that run, by id."""
+        return tuple(c.spec for c in self._pipeline.detectors)
+
+    def reset(self, seed: int, now_ns: int = 0) -> None:
+        """Forget everything; warm-up begins at now_ns."""
+        self._state = self._pipeline.reset(seed, now_ns)
+        self._may_move = False
+        self.resets.clear()
+
+    def step(self, samples: Sequence[Sample], now_ns: int, verdicts: Mapping[str, str] | None = None) -> Decision:
+        """Decide on what arrived until now_ns.
+
+        Args:
+            samples: those that arrived since the last step, in order of arrival.
+            now_ns: time of the tick, on the supervisor's timeline; it must not go backwards.
+            verdicts: recorded wall-clock verdicts (late, hung) by detector id.
+
+        Raises:
+            ForeshockError: now_ns lies before the previous tick.
+        """
+        if now_ns < self._state.trust.at_ns:
+            raise ForeshockError(f"time goes backwards: tick at {now_ns} ns after {self._state.trust.at_ns} ns")
+        self._state, decision = self._pipeline.step(self._state, samples, now_ns, verdicts)
+        self._may_move = decision.motion_permitted
+        return decision
+
+    def operator_reset(self, who: str, why: str, now_ns: int) -> OperatorReset:
+        """Release latched levels; what still demands protection demands it again in the next tick. Recorded."""
+        record = OperatorReset(now_ns, who, why)
+        self.resets.append(record)
+        self._state = msgspec.structs.replace(self._state, overall=LevelState(), levels={})
+        return record
+
+    def lease(self, nonce: int, guard_ns: int, ttl_s: float = 0.1) -> Lease | None:
+        """Permission to move, in answer to a guard's request; None in warm-up or at minimal risk."""
+        return Lease(self._epoch, nonce, guard_ns, round(ttl_s * NS_PER_S)) if self._may_move else None
+
+    @property
+    def level(self) -> ProtectionLevel:
+        """Protection level overall after the last tick."""
+        return self._state.overall.level
+
+    def close(self) -> None:
+        """End child processes; idempotent."""
+        for c in self._pipeline.detectors:
+            close = getattr(c.detector, "close", None)
+            if close is not None:
+                close()
+
+
+def inputs_of(spec: DetectorSpec, config: object) -> tuple[Input, ...]:
+    """The inputs of a detector with this configuration."""
+    return spec.inputs(config) if callable(spec.inputs) else spec.inputs
+
+
+def build_detector(spec: DetectorSpec, config: object, place: str) -> Detector:
+    """A detector in this process.
+
+    Raises:
+        MissingExtraError: a package that it needs is not installed; says which command installs it.
+        BadInputError: its settings do not fit.
+        PluginError: anything else that its build raises.
+    """
+    try:
+        return spec.build(config)
+    except ImportError as e:
+        extra = f"foreshock[{spec.extra}]" if spec.extra else e.name or "its package"
+        problem = f"detector {spec.id!r} needs {e.name or e}, which is not installed"
+        raise MissingExtraError(place, problem, f"; run: pip install '{extra}'") from e
+    except BadInputError as e:
+        raise type(e)(f"{place}.config: {e.place}", e.problem, e.hint) from e
+    except Exception as e:
+        raise PluginError(place, f"detector {spec.id!r} cannot be built: {type(e).__name__}: {e}") from e
+
+
+def contain(spec: DetectorSpec, entry: DetectorEntry, place: str, robot: str, taxonomy: Taxonomy) -> Contained:
+    """A detector behind its guard, with its channels bound."""
+    settings = convert(entry.config, spec.config, f"{place}.config")
+    inputs = inputs_of(spec, settings)
+    names = {i.name for i in inputs}
+    for name in entry.channels:
+        if name not in names:
+            where = f"{place}.channels.{name}"
+            raise ConfigError(where, f"detector {spec.id!r} has no such input", nearest(name, names))
+    bound = [
+        i
+        if i.channel == "*"
+        else msgspec.structs.replace(i, channel=f"{robot}/{entry.channels.get(i.name, i.channel)}")
+        for i in inputs
+    ]
+    if (entry.isolation or spec.isolation) == "process":
+        return Contained(spec, ChildDetector(spec, settings, place), bound, taxonomy)
+    return Contained(spec, build_detector(spec, settings, place), bound, taxonomy)
