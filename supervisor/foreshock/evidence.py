@@ -1,7 +1,8 @@
 """The evidence window: indications in, precursors out.
 
 A track follows one (kind, subject) as one detector sees it. An onset is one occurrence; a condition that persists
-counts one more per recurrence period. At loss of observation a track freezes: its clock stands still, so that neither its share of
+counts one more per recurrence period.
+At loss of observation a track freezes: its clock stands still, so that neither its share of
 m nor of q fades, and it runs on when the detector observes again. Evidence is cleared only by observing its absence.
 """
 

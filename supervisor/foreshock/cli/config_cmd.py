@@ -1,0 +1,44 @@
+"""``foreshock config``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import msgspec
+
+from foreshock.cli.output import console, emit, notes
+from foreshock.config import config_schema, load_config
+from foreshock.registry import Registry
+from foreshock.supervisor import Supervisor
+
+__all__ = ["config"]
+
+
+@click.group()
+def config() -> None:
+    """Configuration files."""
+
+
+@config.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def check(file: Path, as_json: bool) -> None:
+    """Check a configuration: every key, every plugin, every detector's settings."""
+    supervisor = Supervisor(load_config(file), file.parent)
+    ids = [spec.id for spec in supervisor.detectors]
+    supervisor.close()
+    if as_json:
+        emit({"file": str(file), "detectors": ids, "config": supervisor.config})
+    else:
+        console.print(f"[green]ok[/] {file}: {len(ids)} detectors ({', '.join(ids)})")
+
+
+@config.command()
+def schema() -> None:
+    """Print the JSON schema of a configuration, with the settings of all installed plugins."""
+    registry = Registry()
+    for broken in registry.load_all():
+        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {broken.reason}")
+    generated = config_schema(registry.detectors(), registry.policies())
+    click.echo(msgspec.json.format(msgspec.json.encode(generated, order="sorted"), indent=2).decode())

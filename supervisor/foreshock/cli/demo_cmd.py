@@ -1,0 +1,145 @@
+"""``foreshock demo``: the paper's case study A1 without the supervisor, with its gate alone, and with the ladder."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+import msgspec
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from foreshock.cli.output import NEGATIVE, OK, console, emit, notes, table
+from foreshock.cli.simulate_cmd import summary, timeline
+from foreshock.errors import BadInputError, TwinError
+from foreshock.registry import Registry
+from foreshock.session.isolated import Failure, Job, run_all
+from foreshock.session.run import Run
+from foreshock.session.scenario import Scenario, find_scenario
+from foreshock.session.sweep import ArmSpec, Cell, CellResult, sweep
+
+__all__ = ["demo"]
+
+SCENARIO = "a1-fall-onto-human"
+ARMS = (
+    ArmSpec("unsupervised", "off"),
+    ArmSpec("the paper's gate alone", "on", "paper-gate"),
+    ArmSpec("ladder", "on", "ladder"),
+)
+SHOWN = (ArmSpec("unsupervised (shadow)", "shadow", "ladder"), *ARMS[1:])
+"""The first run is judged but not acted on, so that its P and T can be shown too."""
+
+NOTES = (
+    "The paper's case study A1, “fall onto human”, in closed loop on a frontal-plane plant of TALOS packaged as an FMU: "
+    "while stepping in place one foot meets a patch of low friction. Slip, torso spike and the deviation of the centre "
+    "of mass are found by the detectors in noisy sensor streams; nothing of the cascade is scripted.",
+    "P is Eq. 1 of the paper on the precursors tied to A1, and T = 1 − P. The paper's gate acts at T < 0.3, which waits "
+    "for the third precursor; the ladder suppresses the next step at a caution gate of T < 0.6 and takes all four "
+    "protocols at T < 0.3.",
+)
+
+
+def cells(seeds: int, per_cell: int) -> list[Cell]:
+    """The sweep: the default point on all seeds, severities on fewer."""
+    every = tuple(range(seeds))
+    some = every[:per_cell]
+    points = [Cell("default", "default", {}, every)]
+    points += [Cell("friction", f"μ {v:g}", {"mu_low": v}, some) for v in (0.02, 0.045, 0.06, 0.075, 0.1)]
+    points += [Cell("duration", f"{v:g} s", {"slip_duration": v}, some) for v in (0.1, 0.2, 0.6, 1.2)]
+    points += [Cell("push", f"{v:g} N s", {"mu_low": 0.6, "push": v}, some) for v in (8.0, 16.0, 24.0, 40.0)]
+    return points
+
+
+@click.command()
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("out/demo"),
+    show_default=True,
+    help="Folder for report and pictures.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the three runs that are shown.")
+@click.option(
+    "--seeds", type=click.IntRange(1), default=50, show_default=True, help="Runs per arm at default parameters."
+)
+@click.option("--per-cell", type=click.IntRange(1), default=20, show_default=True, help="Runs per arm and severity.")
+@click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def demo(out: Path, seed: int, seeds: int, per_cell: int, workers: int, as_json: bool) -> int:
+    """Run the paper's case study three ways, count how often each happens, and write a report."""
+    try:
+        from foreshock.report import runs_figure, sweep_figure, write_report
+    except ImportError as e:
+        raise BadInputError("demo", f"the report needs {e.name}", "; run: pip install 'foreshock[report]'") from e
+    scenario = find_scenario(SCENARIO, Registry())
+    shown = _three(scenario, seed)
+    if not as_json:
+        for label, run in shown:
+            timeline(run, label)
+            console.print(summary(run) + "\n")
+    points = cells(seeds, min(per_cell, seeds))
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[failed]} failed"),
+        console=notes,
+        transient=True,
+    ) as bar:
+        task = bar.add_task("sweep", total=len(ARMS) * sum(len(c.seeds) for c in points), failed=0)
+        failed = 0
+
+        def done(_: int, result: Run | Failure) -> None:
+            nonlocal failed
+            failed += isinstance(result, Failure)
+            bar.update(task, advance=1, failed=failed)
+
+        results = sweep(scenario, ARMS, points, workers, done)
+    out.mkdir(parents=True, exist_ok=True)
+    command = f"foreshock demo --seed {seed} --seeds {seeds} --per-cell {per_cell}"
+    write_report(out / "report.html", "A1: fall onto human", shown, results, NOTES, command)
+    runs_figure(shown).savefig(out / "runs.png", dpi=110)
+    sweep_figure(results).savefig(out / "sweep.png", dpi=110)
+    files = [str(out / name) for name in ("report.html", "runs.png", "sweep.png")]
+    if as_json:
+        runs = {label: msgspec.structs.replace(run, series={}) for label, run in shown}
+        emit({"runs": runs, "sweep": results, "files": files})
+    else:
+        _print_sweep(results)
+        console.print("report: " + files[0])
+    saved = shown[0][1].accident and not shown[-1][1].events
+    return OK if saved else NEGATIVE
+
+
+def _three(scenario: Scenario, seed: int) -> list[tuple[str, Run]]:
+    jobs = [Job(scenario.with_(policy=a.policy), a.arm, seed) for a in SHOWN]
+    shown = []
+    for arm, result in zip(SHOWN, run_all(jobs, workers=1), strict=True):
+        if isinstance(result, Failure):
+            raise TwinError(result.kind, result.detail, result.log)
+        shown.append((arm.label, result))
+    return shown
+
+
+def _print_sweep(results: list[CellResult]) -> None:
+    rows = []
+    for r in results:
+        lead = sorted(r.lead_s)
+        rows.append(
+            (
+                r.cell.factor,
+                r.cell.label,
+                r.arm,
+                str(r.falls),
+                str(r.accidents),
+                str(r.prevented),
+                str(r.caused),
+                str(r.false_interventions),
+                f"{lead[len(lead) // 2]:.2f}" if lead else "–",
+            )
+        )
+    right = ("fell", "onto human", "prevented", "caused", "false", "lead (s)")
+    table("Sweep (95% Wilson intervals; arms paired by seed)", "factor", "value", "arm", *right, rows=rows, right=right)
+    if any(r.failures for r in results):
+        console.print(f"[red]{sum(r.failures for r in results)} runs gave no result[/]")

@@ -1,0 +1,73 @@
+"""The root command, and how every error ends: one message with place and nearest name, and an exit code."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from foreshock.cli.config_cmd import config
+from foreshock.cli.demo_cmd import demo
+from foreshock.cli.detectors_cmd import detectors
+from foreshock.cli.output import BAD_INPUT, FAILED, OK, emit, notes
+from foreshock.cli.scenarios_cmd import scenarios
+from foreshock.cli.simulate_cmd import simulate
+from foreshock.cli.taxonomy_cmd import taxonomy
+from foreshock.errors import BadInputError, ForeshockError, TwinError, nearest
+
+__all__ = ["cli", "main"]
+
+
+class _Root(click.Group):
+    """A group that names the nearest command."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            hint = nearest(args[0], self.list_commands(ctx))
+            raise click.UsageError(f"no command {args[0]!r}{hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=_Root, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="foreshock")
+def cli() -> None:
+    """Foreshock: a safety supervisor for humanoid robots.
+
+    Precursors in, accident probability and trust, graded interventions out.
+
+    Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a twin that failed.
+    """
+
+
+for command in (config, demo, detectors, scenarios, simulate, taxonomy):
+    cli.add_command(command)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the command line and exit."""
+    words = sys.argv[1:] if args is None else args
+    as_json = "--json" in words
+    code, kind, message = OK, "", ""
+    try:
+        result = cli.main(words, prog_name="foreshock", standalone_mode=False)
+        code = result if isinstance(result, int) else OK
+    except click.exceptions.Exit as e:
+        code = e.exit_code
+    except click.Abort:
+        code, kind, message = FAILED, "interrupted", "interrupted"
+    except click.ClickException as e:
+        code, kind, message = BAD_INPUT, "usage", e.format_message()
+    except BadInputError as e:
+        code, kind, message = BAD_INPUT, type(e).__name__, str(e)
+    except TwinError as e:
+        code, kind, message = FAILED, f"twin {e.kind}", str(e)
+    except ForeshockError as e:
+        code, kind, message = FAILED, type(e).__name__, str(e)
+    if message:
+        if as_json:
+            emit(None, [{"kind": kind, "message": message}])
+        else:
+            notes.print(f"[bold red]error:[/] {message.replace('[', chr(92) + '[')}", soft_wrap=True)
+    sys.exit(code)

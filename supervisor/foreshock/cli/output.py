@@ -1,0 +1,53 @@
+"""How commands print: tables for people, one JSON envelope for programs, one line for an error.
+
+Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a twin that failed.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+from rich.console import Console
+from rich.table import Table
+
+__all__ = ["BAD_INPUT", "FAILED", "NEGATIVE", "OK", "console", "emit", "notes", "table"]
+
+OK, NEGATIVE, BAD_INPUT, FAILED = 0, 1, 2, 3
+SCHEMA = "foreshock/1"
+
+console = Console(highlight=False)
+"""Results."""
+notes = Console(stderr=True, highlight=False)
+"""Progress, hints and errors."""
+
+
+def _plain(value: Any) -> Any:
+    """Builtins only; a number that JSON cannot say is null."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    return value
+
+
+def emit(result: Any, errors: list[dict[str, str]] | None = None) -> None:
+    """Print the envelope {schema, ok, result, errors}."""
+    plain = _plain(msgspec.to_builtins(result))
+    envelope = {"schema": SCHEMA, "ok": not errors, "result": plain, "errors": errors or []}
+    sys.stdout.write(msgspec.json.format(msgspec.json.encode(envelope), indent=2).decode() + "\n")
+
+
+def table(title: str, *columns: str, rows: Sequence[tuple[str, ...]], right: tuple[str, ...] = ()) -> None:
+    """Print a table; the columns named in right are aligned to it."""
+    t = Table(title=title, title_justify="left", title_style="bold", header_style="bold", pad_edge=False)
+    for c in columns:
+        t.add_column(c, justify="right" if c in right else "left", overflow="fold")
+    for row in rows:
+        t.add_row(*row)
+    console.print(t)

@@ -1,0 +1,58 @@
+"""One HTML file that holds everything: no script, no network, pictures inline."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+
+import jinja2
+from matplotlib.figure import Figure
+
+from foreshock.report.plots import runs_figure, sweep_figure
+from foreshock.session.run import Run
+from foreshock.session.sweep import CellResult
+
+__all__ = ["write_report"]
+
+
+def _picture(figure: Figure) -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+def write_report(
+    path: Path,
+    title: str,
+    runs: Sequence[tuple[str, Run]],
+    sweep: Sequence[CellResult] = (),
+    notes: Sequence[str] = (),
+    command: str = "",
+) -> None:
+    """Write a report.
+
+    Args:
+        path: the HTML file.
+        title: its heading.
+        runs: label and run, shown side by side.
+        sweep: results to tabulate and plot.
+        notes: paragraphs on how to read it.
+        command: what reproduces it.
+    """
+    source = files("foreshock").joinpath("data/report.html.j2").read_text()
+    page = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(
+        page.from_string(source).render(
+            title=title,
+            runs=runs,
+            sweep=sweep,
+            notes=notes,
+            command=command,
+            runs_picture=_picture(runs_figure(runs)),
+            sweep_picture=_picture(sweep_figure(sweep)) if sweep else "",
+        )
+    )
