@@ -44,7 +44,8 @@ def find_plant(plant: str | Path) -> Path:
     if (folder / f"{folder.resolve().name}.toml").is_file():
         return folder.resolve()
     if folder.is_dir():
-        raise BadInputError(str(folder), "is no plant", f"; a plant's folder holds {folder.resolve().name}.toml and its C files")
+        name = folder.resolve().name
+        raise BadInputError(str(folder), "is no plant", f"; a plant's folder holds {name}.toml and its C files")
     raise BadInputError("plant", f"there is no plant {str(plant)!r}", nearest(str(plant), known))
 
 

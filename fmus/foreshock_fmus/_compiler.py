@@ -9,7 +9,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -70,13 +70,16 @@ def _probe(command: tuple[str, ...]) -> Compiler | None:
     return Compiler(command, lines[0] if lines else "") if result.returncode == 0 else None
 
 
-def compile_library(compiler: Compiler, sources: Sequence[Path], include: Sequence[Path], defines: dict[str, str], output: Path) -> None:
+def compile_library(
+    compiler: Compiler, sources: Sequence[Path], include: Sequence[Path], defines: Mapping[str, str], output: Path
+) -> None:
     """Compile C files into one shared library.
 
     Raises:
         BadInputError: with what the compiler said.
     """
-    undefined = ("-Wl,--no-undefined",) if platform.system() == "Linux" else ()  # a missing plant_step fails here, not at load
+    # So that a missing plant_step fails here, not at load.
+    undefined = ("-Wl,--no-undefined",) if platform.system() == "Linux" else ()
     command = [
         *compiler.command,
         *FLAGS,

@@ -149,5 +149,6 @@ def _check_names(path: Path, variables: tuple[PlantVariable, ...]) -> None:
     seen: dict[str, str] = {"time": "time (the independent variable)"}
     for v in variables:
         if v.symbol in seen:
-            raise ConfigError(f"{path}: variables", f"{v.name!r} clashes with {seen[v.symbol]!r}", "; names must differ in C too")
+            problem = f"{v.name!r} clashes with {seen[v.symbol]!r}"
+            raise ConfigError(f"{path}: variables", problem, "; names must differ in C too")
         seen[v.symbol] = v.name

@@ -98,6 +98,11 @@ def _common(name: str, reference: int, v: PlantVariable) -> dict[str, str]:
     return found
 
 
+def _time(reference: int) -> dict[str, str]:
+    """The independent variable."""
+    return {"name": "time", "valueReference": str(reference), "causality": "independent", "variability": "continuous"}
+
+
 def _scalars(plant: PlantDescription) -> list[tuple[str, int, PlantVariable]]:
     return [(name, i, v) for v in plant.variables for i, name in enumerate(v.scalars())]
 
@@ -107,8 +112,7 @@ def _add_variables_3(root: Element, plant: PlantDescription) -> None:
     scalars = _scalars(plant)
     for reference, (name, i, v) in enumerate(scalars):
         _add(variables, "Float64", **_common(name, reference, v), **_attributes(v, i))
-    time = {"name": "time", "valueReference": str(len(scalars)), "causality": "independent", "variability": "continuous"}
-    _add(variables, "Float64", **time, unit="s")
+    _add(variables, "Float64", **_time(len(scalars)), unit="s")
     structure = _add(root, "ModelStructure")
     for tag in ("Output", "InitialUnknown"):
         for reference, (_, _, v) in enumerate(scalars):
@@ -121,8 +125,7 @@ def _add_variables_2(root: Element, plant: PlantDescription) -> None:
     scalars = _scalars(plant)
     for reference, (name, i, v) in enumerate(scalars):
         _add(_add(variables, "ScalarVariable", **_common(name, reference, v)), "Real", **_attributes(v, i))
-    time = {"name": "time", "valueReference": str(len(scalars)), "causality": "independent", "variability": "continuous"}
-    _add(_add(variables, "ScalarVariable", **time), "Real", unit="s")
+    _add(_add(variables, "ScalarVariable", **_time(len(scalars))), "Real", unit="s")
     structure = _add(root, "ModelStructure")
     outputs = [i for i, (_, _, v) in enumerate(scalars, start=1) if v.causality == "output"]
     for tag in ("Outputs", "InitialUnknowns") if outputs else ():
@@ -137,4 +140,5 @@ def _add(parent: Element, tag: str, **attributes: str) -> Element:
 
 def _xml(root: Element) -> bytes:
     ElementTree.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="utf-8") + b"\n"
+    text: bytes = ElementTree.tostring(root, encoding="utf-8")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + text + b"\n"

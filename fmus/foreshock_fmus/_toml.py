@@ -12,7 +12,7 @@ from foreshock.errors import ConfigError, nearest
 
 __all__ = ["TomlTable"]
 
-_TYPE_NAMES = {str: "a string", float: "a number", int: "an integer", bool: "true or false", list: "a list", dict: "a table"}
+_TYPE_NAMES = {str: "a string", float: "a number", list: "a list", dict: "a table"}
 
 
 class TomlTable:
@@ -27,6 +27,7 @@ class TomlTable:
     def __init__(self, data: dict[str, Any], file: str, key: str = "") -> None:
         self._data, self._file, self.key = data, file, key
         self._asked: set[str] = set()
+        self._known: set[str] = set()
 
     @classmethod
     def read(cls, path: Path) -> TomlTable:
@@ -53,6 +54,7 @@ class TomlTable:
 
     def has(self, name: str) -> bool:
         """Whether the key is there."""
+        self._known.add(name)
         return name in self._data
 
     def names(self) -> tuple[str, ...]:
@@ -104,7 +106,7 @@ class TomlTable:
         """Refuse every key that was not asked for."""
         for name in self._data:
             if name not in self._asked:
-                self.fail(name, "is not a known key", nearest(name, self._asked))
+                self.fail(name, "is not a known key", nearest(name, self._asked | self._known))
 
     def _typed(self, name: str, kind: type, default: Any) -> Any:
         self._asked.add(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 import types
 import typing
@@ -13,9 +14,20 @@ import msgspec
 
 from foreshock.errors import ConfigError, nearest
 
-__all__ = ["convert", "read_toml"]
+__all__ = ["convert", "read_toml", "within"]
 
 T = TypeVar("T")
+
+
+def within(place: str, value: float, least: float, most: float = math.inf, *, above: bool = False) -> None:
+    """Refuse a number outside [least, most]; above excludes least. Neither NaN nor an infinity is ever within.
+
+    Raises:
+        ConfigError: names place, value and range.
+    """
+    if not (math.isfinite(value) and least <= value <= most and not (above and value == least)):
+        floor = f"above {least:g}" if above else f"at least {least:g}"
+        raise ConfigError(place, f"{value!r} is not a finite number {floor}" + (f" and at most {most:g}" if most < math.inf else ""))
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -42,6 +54,8 @@ def convert(data: object, to: type[T], place: str) -> T:
     _refuse_unknown(data, to, place)
     try:
         return msgspec.convert(data, to)
+    except ConfigError as e:
+        raise ConfigError(f"{place}: {e.place}", e.problem, e.hint) from None
     except msgspec.ValidationError as e:
         problem, _, path = str(e).partition(" - at ")
         keys = path.strip("`").removeprefix("$").removeprefix(".")
@@ -66,6 +80,10 @@ def _refuse_unknown(data: object, to: Any, place: str) -> None:
         options = [t for t in typing.get_args(to) if t is not type(None)]
         if len(options) == 1:
             _refuse_unknown(data, options[0], place)
+    elif origin is typing.Literal:
+        known = [a for a in typing.get_args(to) if isinstance(a, str)]
+        if isinstance(data, str) and data not in known:
+            raise ConfigError(place, f"{data!r} is not one of {', '.join(map(repr, known))}", nearest(data, known))
     elif isinstance(data, list) and origin in (tuple, list):
         for k, item in enumerate(data):
             _refuse_unknown(item, typing.get_args(to)[0], f"{place}[{k}]")

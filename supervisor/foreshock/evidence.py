@@ -14,6 +14,7 @@ from typing import Literal
 
 import msgspec
 
+from foreshock._strict import within
 from foreshock.records import Indication, Phase, Precursor, SampleRef
 
 __all__ = ["Evidence", "Key", "Track", "Window", "step"]
@@ -29,11 +30,23 @@ class Window(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         length_s: length of the window; 1.5 s is the upper end of the paper's overlap of 0.5 to 1.5 s (section 3.2.2).
         recurrence_s: a condition that persists counts one more occurrence per this time; 0 means length_s.
         kernel: ``boxcar`` as in the paper, or ``exponential`` with time constant length_s, cut off at five of them.
+
+    Raises:
+        ConfigError: a time that is not finite or shorter than SHORTEST_S.
     """
 
     length_s: float = 1.5
     recurrence_s: float = 0.0
     kernel: Literal["boxcar", "exponential"] = "boxcar"
+
+    def __post_init__(self) -> None:
+        within("window.length_s", self.length_s, SHORTEST_S)
+        if self.recurrence_s != 0.0:
+            within("window.recurrence_s", self.recurrence_s, SHORTEST_S)
+
+
+SHORTEST_S = 0.001
+"""A shorter window or recurrence period (1 kHz) would count ticks instead of conditions."""
 
 
 class Track(msgspec.Struct, frozen=True):
@@ -41,7 +54,8 @@ class Track(msgspec.Struct, frozen=True):
 
     Attributes:
         present: verdict of the last observation.
-        onset_ns: source stamp of the current or last onset.
+        onset_ns: the current or last onset.
+        stretches: (source stamp of the onset, when last present) of stretches of presence that still count.
         occurrences_ns: occurrences that still count.
         last_ns: when it was last present.
         peaks: (first, last, severity) of stretches of presence, for the window's maximum.
@@ -52,6 +66,7 @@ class Track(msgspec.Struct, frozen=True):
 
     present: bool
     onset_ns: int
+    stretches: tuple[tuple[int, int], ...]
     occurrences_ns: tuple[int, ...]
     last_ns: int
     peaks: tuple[tuple[int, int, float], ...]
@@ -101,7 +116,7 @@ def step(
             fresh.add(key)
             stamp = min(seen.stamp_ns, now_ns)
             peak = ((stamp, now_ns, seen.severity),)
-            tracks[key] = Track(True, stamp, (stamp,), now_ns, peak, 0, -1, seen)
+            tracks[key] = Track(True, stamp, ((stamp, now_ns),), (stamp,), now_ns, peak, 0, -1, seen)
             continue
         old = _thaw(old, now_ns)
         local = now_ns - old.stopped_ns
@@ -137,8 +152,10 @@ def _present(old: Track, seen: Indication, local_ns: int, recur_ns: int) -> Trac
     occurrences = old.occurrences_ns
     onset = old.onset_ns
     if not old.present:
-        occurrences, onset = (*occurrences, stamp), stamp
+        occurrences, onset = tuple(sorted((*occurrences, stamp))), stamp
+        stretches = (*old.stretches, (min(seen.stamp_ns, local_ns + old.stopped_ns), local_ns))
     else:
+        stretches = (*old.stretches[:-1], (old.stretches[-1][0], local_ns))
         newest = occurrences[-1] if occurrences else onset
         while newest + recur_ns <= local_ns:
             newest += recur_ns
@@ -151,7 +168,7 @@ def _present(old: Track, seen: Indication, local_ns: int, recur_ns: int) -> Trac
         while kept and kept[-1][2] <= seen.severity:
             kept = kept[:-1]
         peaks = (*kept, (local_ns, local_ns, seen.severity))
-    return Track(True, onset, occurrences, local_ns, peaks, old.stopped_ns, -1, seen)
+    return Track(True, onset, stretches, occurrences, local_ns, peaks, old.stopped_ns, -1, seen)
 
 
 def _expire(track: Track, now_ns: int, span_ns: int) -> Track | None:
@@ -160,14 +177,16 @@ def _expire(track: Track, now_ns: int, span_ns: int) -> Track | None:
     horizon = stop - track.stopped_ns - span_ns
     if not track.present and track.last_ns <= horizon:
         return None
-    occurrences, peaks = track.occurrences_ns, track.peaks
+    occurrences, peaks, stretches = track.occurrences_ns, track.peaks, track.stretches
     if occurrences and occurrences[0] <= horizon:
         occurrences = tuple(t for t in occurrences if t > horizon)
     if peaks and peaks[0][1] <= horizon:
         peaks = tuple(p for p in peaks if p[1] > horizon)
-    if occurrences is track.occurrences_ns and peaks is track.peaks:
+    if stretches[0][1] <= horizon and not (track.present and len(stretches) == 1):
+        stretches = tuple(s for s in stretches[:-1] if s[1] > horizon) + stretches[-1:]
+    if occurrences is track.occurrences_ns and peaks is track.peaks and stretches is track.stretches:
         return track
-    return msgspec.structs.replace(track, occurrences_ns=occurrences, peaks=peaks)
+    return msgspec.structs.replace(track, occurrences_ns=occurrences, peaks=peaks, stretches=stretches)
 
 
 def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[Key]) -> tuple[Precursor, ...]:
@@ -186,7 +205,7 @@ def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[
             q = max(weight, math.fsum(math.exp((t - local) / tau) for t in track.occurrences_ns))
         phase: Phase = "onset" if key in fresh else "ongoing" if track.present else "cleared"
         peak = max((p[2] for p in track.peaks), default=track.seen.severity)
-        onset = (track.occurrences_ns[0] if track.occurrences_ns else track.onset_ns) + track.stopped_ns
+        onset = min(source for source, _ in track.stretches)
         seen = track.seen
         refs: tuple[SampleRef, ...] = seen.evidence
         mine = Precursor(

@@ -40,7 +40,7 @@ class LogisticExponential(msgspec.Struct, frozen=True, forbid_unknown_fields=Tru
             if not (value > 0 and math.isfinite(value)):
                 raise ConfigError(f"risk.{name}", f"{value!r} is not a positive number")
         if not math.isfinite(self.b):
-            raise ConfigError("risk.b", f"{self.b!r} is not a number")
+            raise ConfigError("risk.b", f"{self.b!r} is not a finite number")
 
     @overload
     def probability(self, m: float, q: float) -> float: ...
@@ -50,7 +50,8 @@ class LogisticExponential(msgspec.Struct, frozen=True, forbid_unknown_fields=Tru
         """P for m distinct precursors with q occurrences, both >= 0; arrays broadcast. NaN in, NaN out."""
         if isinstance(m, (int, float)) and isinstance(q, (int, float)):
             x = -self.a * (m - self.b)
-            return -math.expm1(-self.c * q) / (1.0 + math.exp(x)) if x < 700.0 else 0.0
+            # min() gives its first argument unless the other is smaller, so that a NaN stays one
+            return -math.expm1(-self.c * q) / (1.0 + math.exp(min(x, 700.0)))
         x = -self.a * (np.asarray(m, float) - self.b)
         return np.asarray(-np.expm1(-self.c * np.asarray(q, float)) / (1.0 + np.exp(np.minimum(x, 700.0))))
 

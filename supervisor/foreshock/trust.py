@@ -11,7 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import msgspec
 
-from foreshock.errors import ConfigError
+from foreshock._strict import within
+from foreshock.errors import ConfigError, nearest
 from foreshock.records import ProtectionLevel, RiskEstimate, Trust
 from foreshock.taxonomy import Taxonomy
 
@@ -25,11 +26,19 @@ class TrustSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         recovery_s: time constant of recovery; it falls at once.
         unobserved_cap: control_trust is at most this for modes (and overall) of which a kind is not observed.
         grace_s: a kind that stays unobserved longer brings the minimal risk condition.
+
+    Raises:
+        ConfigError: a number that would switch the cap or the grace time off, such as NaN.
     """
 
     recovery_s: float = 0.5
     unobserved_cap: float = 0.8
     grace_s: float = 0.3
+
+    def __post_init__(self) -> None:
+        within("trust.recovery_s", self.recovery_s, 0.0, above=True)
+        within("trust.unobserved_cap", self.unobserved_cap, 0.0, 1.0)
+        within("trust.grace_s", self.grace_s, 0.0)
 
 
 class Gates(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -43,7 +52,7 @@ class Gates(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         latch: levels from this one on hold until an operator resets them; ``none`` for no latch.
 
     Raises:
-        ConfigError: gates that are not in order or not within 0..1.
+        ConfigError: gates that are not in order or not within 0..1, or a negative hysteresis or dwell.
     """
 
     caution: float = 0.6
@@ -56,7 +65,9 @@ class Gates(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not (0.0 <= self.protective <= self.caution <= 1.0):
             raise ConfigError("gates", f"protective {self.protective} <= caution {self.caution} must hold within 0..1")
         if self.latch not in LATCHES:
-            raise ConfigError("gates.latch", f"{self.latch!r} is not one of {', '.join(LATCHES)}")
+            raise ConfigError("gates.latch", f"{self.latch!r} is not one of {', '.join(LATCHES)}", nearest(self.latch, LATCHES))
+        within("gates.hysteresis", self.hysteresis, 0.0, 1.0)
+        within("gates.dwell_s", self.dwell_s, 0.0)
 
 
 LATCHES: Mapping[str, int] = {

@@ -35,7 +35,8 @@ class BalanceConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         contact_on_n: a sole carries load above this vertical force; about a tenth of TALOS's weight.
         contact_off_n: it no longer does below this.
         com_deviation_m: threshold of com-lateral-deviation; nominal stepping in place of the frontal-plane model
-            stays below it in 50 runs of 60 s.
+            stays below it in 50 runs of 60 s. Where there is no motion plan, half of the nominal sway is added: the
+            sway that the robot intends cannot be told from a deviation then.
         com_deviation_full_m: deviation of severity 1: the CoM of a centred TALOS stands over the middle of one foot.
         com_nominal_s: time constant of the running nominal that stands in where there is no motion plan.
         capture_margin_full_m: capture point this far outside of both soles is severity 1: half a sole's width.
@@ -56,7 +57,9 @@ class BalanceConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         sway_learn_limit: learning raises a nominal amplitude at most to this multiple of the least one.
         slip_m: threshold of foot-micro-slip. Same source as com_deviation_m.
         slip_full_m: displacement of severity 1.
-        slip_settle_s: a sole counts as set down after carrying load for this long.
+        slip_settle_s: a sole counts as set down after carrying load for this long: a third of double support, while
+            the load is still below half of the weight. Sooner, a foot that is set down beside one that has slid is
+            found to slip too: the legs draw it in by some 2 mm until it bears load (frontal-plane model).
         slip_forget_s: displacement leaks away with this time constant, so that drift of the odometry slower than
             slip_m / slip_forget_s is no slip and a slip that has ended is cleared.
         slip_sigmas: the threshold is never below so many standard deviations of the estimated displacement.
@@ -102,14 +105,14 @@ class BalanceConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     sway_learn_limit: float = 1.5
     slip_m: float = 0.002
     slip_full_m: float = 0.02
-    slip_settle_s: float = 0.03
+    slip_settle_s: float = 0.05
     slip_forget_s: float = 1.5
     slip_sigmas: float = 5.0
     sole_position_sd_m: float = 0.001
     sole_velocity_sd_m_s: float = 0.01
     jump_m: float = 0.01
     release_ratio: float = 0.7
-    acceleration_filter_s: float = 0.03
+    acceleration_filter_s: float = 0.05
     gap_s: float = 0.1
 
     def __post_init__(self) -> None:

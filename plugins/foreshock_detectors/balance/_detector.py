@@ -54,7 +54,7 @@ class BalanceDetector:
         self._com = ComDeviation(config)
         self._stability = Stability(config, self._robot.mass_kg)
         self._torso = TorsoRate(config)
-        self._disagreement: tuple[float, ...] | None = None
+        self._disagreement: list[float] | None = None
         self._sway = Hysteresis(config.release_ratio)
         least_m, least_rad = config.sway_com_nominal_m, config.sway_roll_nominal_rad
         # a tenth of the nominal amplitude turns a half swing round: above the noise, far below what is judged
@@ -69,44 +69,40 @@ class BalanceDetector:
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:  # noqa: ARG002  # time comes from the stamps
         """One indication per observed kind and subject."""
         latest = inputs.latest
-        imu_ok = self._take_imu(inputs)
+        imu = self._take_imu(inputs)
         joints, odometry = latest.get("joints"), latest.get("odometry")
         answer: list[Indication] = []
         if joints is not None and odometry is not None:
             if joints.stamp_ns > self._stamp_ns:
-                self._advance(joints, odometry, inputs)
+                self._advance(joints, odometry, imu, inputs)
             answer += self._body_answer
             if "left_wrench" in latest and "right_wrench" in latest:
                 answer += self._slip_answer
-        if imu_ok:
-            answer.append(self._torso_indication())
+            else:
+                answer += [i for i in self._slip_answer if i.present and f"{i.subject}_wrench" in latest]
+        if imu is not None:
+            answer.append(self._torso_indication(imu))
         return answer
 
-    def _advance(self, joints: Sample, odometry: Sample, inputs: Inputs) -> None:
+    def _advance(self, joints: Sample, odometry: Sample, imu: Sample | None, inputs: Inputs) -> None:
         stamp_ns = joints.stamp_ns
-        body = self._kinematics.evaluate(
-            stamp_ns, _value(joints), _value(odometry), stamp_ns - odometry.stamp_ns
-        )
-        if self._stamp_ns < 0 or stamp_ns - self._stamp_ns > self._config.gap_s * NS_PER_S:
+        body = self._kinematics.evaluate(stamp_ns, _value(joints), _value(odometry), stamp_ns - odometry.stamp_ns)
+        dt_s = (stamp_ns - self._stamp_ns) / NS_PER_S
+        if self._stamp_ns < 0 or dt_s > self._config.gap_s:
             self._restart(stamp_ns)
         self._stamp_ns = stamp_ns
-        refs = [joints, odometry]
         wrenches = self._take_wrenches(body, inputs)
-        feet = None
-        if wrenches is not None:
-            refs += wrenches
-            feet = (self._contact("left", wrenches[0]), self._contact("right", wrenches[1]))
+        refs = [joints, odometry, *wrenches.values()]
         plan = inputs.latest.get("plan")
-        planned_m = _value(plan).com[1] if plan is not None else None
-        if planned_m is not None and not math.isfinite(planned_m):
-            plan = planned_m = None
-        self._com.update(body, planned_m)
-        self._stability.update(body, feet)
-        self._cross_check(inputs.latest.get("imu"))
-        fall = self._stability.time_to_fall_s
-        self._slip_answer = self._slip_indications(body, refs, fall) if feet is not None else []
-        if plan is not None:
+        planned_m = _value(plan).com[1] if plan is not None else math.nan
+        if plan is not None and math.isfinite(planned_m):
             refs.append(plan)
+        else:
+            planned_m = None
+        self._com.update(body, planned_m, self._com_nominal.value)
+        self._stability.update(body, self._contacts(wrenches))
+        self._cross_check(imu, dt_s)
+        self._slip_answer = self._slip_indications(body, joints, odometry, wrenches)
         evidence, newest_ns = _evidence(refs)
         self._body_answer = [self._com_indication(evidence, newest_ns)]
         sway = self._sway_indication(body, planned_m, evidence, newest_ns)
@@ -121,9 +117,9 @@ class BalanceDetector:
         for slip in self._slips.values():
             slip.lose()
 
-    def _take_wrenches(self, body: BodyState, inputs: Inputs) -> list[Sample] | None:
-        """Update load and slip of each foot whose wrench is there; both samples, or None if one is missing."""
-        found: list[Sample] = []
+    def _take_wrenches(self, body: BodyState, inputs: Inputs) -> dict[str, Sample]:
+        """Update load and slip of each foot; the samples of those whose wrench is there and finite."""
+        found: dict[str, Sample] = {}
         for foot, sole in zip(FEET, (body.left, body.right), strict=True):
             sample = inputs.latest.get(f"{foot}_wrench")
             if sample is None or not math.isfinite(sum(_value(sample).force) + sum(_value(sample).torque)):
@@ -131,57 +127,71 @@ class BalanceDetector:
                 continue
             load = self._loads[foot]
             load.update(_vertical(sole, _value(sample).force))
-            self._slips[foot].update(body.stamp_ns, sole, load.loaded)
-            found.append(sample)
-        return found if len(found) == len(FEET) else None
+            self._slips[foot].update(body.stamp_ns, sole, loaded=load.loaded)
+            found[foot] = sample
+        return found
 
-    def _contact(self, foot: str, wrench: Sample) -> FootContact:
-        value = _value(wrench)
-        return self._loads[foot].loaded, value.force, value.torque
+    def _contacts(self, wrenches: dict[str, Sample]) -> tuple[FootContact, FootContact] | None:
+        if len(wrenches) < len(FEET):
+            return None
+        left, right = _value(wrenches["left"]), _value(wrenches["right"])
+        return (
+            (self._loads["left"].loaded, left.force, left.torque),
+            (self._loads["right"].loaded, right.force, right.torque),
+        )
 
-    def _take_imu(self, inputs: Inputs) -> bool:
-        """Filter every new gyroscope sample, by stamp; whether the newest one is there and well formed."""
+    def _take_imu(self, inputs: Inputs) -> Sample | None:
+        """Filter every new gyroscope sample, by stamp; the newest sample, or None if it is missing or malformed."""
         newest = inputs.latest.get("imu")
         if newest is None:
-            return False
+            return None
         samples = inputs.new.get("imu", ())
         if len(samples) > 1:
             samples = sorted(samples, key=_stamp)
         for sample in (*samples, newest):
             if sample.stamp_ns > self._torso.stamp_ns and not self._torso.update(sample.stamp_ns, _value(sample)):
-                return False
-        return True
+                return None
+        return newest
 
-    def _cross_check(self, imu: Sample | None) -> None:
+    def _cross_check(self, imu: Sample | None, dt_s: float) -> None:
         """Low-passed difference between the gyroscope and what base and joints say of its frame."""
-        rate = self._kinematics.angular_velocity(self._config.imu_frame or _value(imu).frame_id) if imu else None
-        if imu is None or rate is None:
+        if imu is None:
             self._disagreement = None
             return
-        raw = tuple(g - r for g, r in zip(_value(imu).angular_velocity, rate, strict=True))
+        rate = self._kinematics.angular_velocity(self._config.imu_frame or _value(imu).frame_id)
+        if rate is None:
+            return
+        raw = [g - r for g, r in zip(_value(imu).angular_velocity, rate, strict=True)]
         last = self._disagreement
         if last is not None:
-            # fixed share: the measure is for people, and its time constant need not be exact
-            k = weight(0.005, self._config.acceleration_filter_s)
-            raw = tuple(a + k * (b - a) for a, b in zip(last, raw, strict=True))
+            k = weight(dt_s, self._config.acceleration_filter_s)
+            raw = [a + k * (b - a) for a, b in zip(last, raw, strict=True)]
         self._disagreement = raw
 
-    def _slip_indications(self, body: BodyState, refs: list[Sample], fall: float | None) -> list[Indication]:
-        blind = not all(slip.observed for slip in self._slips.values())
+    def _slip_indications(
+        self, body: BodyState, joints: Sample, odometry: Sample, wrenches: dict[str, Sample]
+    ) -> list[Indication]:
+        observed = [foot for foot in wrenches if self._slips[foot].observed]
         answer = []
-        for k, (foot, sole) in enumerate(zip(FEET, (body.left, body.right), strict=True)):
+        for foot, sole in zip(FEET, (body.left, body.right), strict=True):
             slip, load = self._slips[foot], self._loads[foot]
-            if not slip.observed or (blind and not slip.present):
-                continue
             present = slip.present
-            evidence, newest_ns = _evidence([refs[0], refs[1], refs[2 + k]])
+            if foot not in observed or (len(observed) < len(FEET) and not present):
+                continue
+            evidence, newest_ns = _evidence([joints, odometry, wrenches[foot]])
             answer.append(
                 Indication(
-                    "foot-micro-slip", foot, newest_ns, present, slip.slip_m, slip.threshold_m, "m",
-                    ramp(slip.slip_m, self._config.slip_m, self._config.slip_full_m) if present else 0.0,
-                    evidence,
-                    fall if present else None,
-                    {
+                    kind="foot-micro-slip",
+                    subject=foot,
+                    stamp_ns=newest_ns,
+                    present=present,
+                    statistic=slip.slip_m,
+                    threshold=slip.threshold_m,
+                    unit="m",
+                    severity=ramp(slip.slip_m, self._config.slip_m, self._config.slip_full_m) if present else 0.0,
+                    evidence=evidence,
+                    time_to_event_s=self._stability.time_to_fall_s if present else None,
+                    measures={
                         "loaded": float(load.loaded),
                         "load_n": load.force_n,
                         "sole_speed_m_s": math.hypot(sole.vx, sole.vy),
@@ -191,31 +201,46 @@ class BalanceDetector:
             )
         return answer
 
-    def _torso_indication(self) -> Indication:
+    def _torso_indication(self, imu: Sample) -> Indication:
         config, torso = self._config, self._torso
-        rate = torso.rate_rad_s or 0.0
         measures = {}
         if self._disagreement is not None:
             measures["rate_disagreement_rad_s"] = math.sqrt(sum(d * d for d in self._disagreement))
+        rate = torso.rate_rad_s
         return Indication(
-            "torso-angular-spike", "", torso.stamp_ns, torso.present, rate, config.torso_rate_rad_s, "rad/s",
-            ramp(rate, config.torso_rate_rad_s, config.torso_rate_full_rad_s) if torso.present else 0.0,
-            (SampleRef("imu/torso", torso.stamp_ns),),
-            self._stability.time_to_fall_s if torso.present else None,
-            measures,
+            kind="torso-angular-spike",
+            subject="",
+            stamp_ns=torso.stamp_ns,
+            present=torso.present,
+            statistic=rate,
+            threshold=config.torso_rate_rad_s,
+            unit="rad/s",
+            severity=ramp(rate, config.torso_rate_rad_s, config.torso_rate_full_rad_s) if torso.present else 0.0,
+            evidence=(SampleRef(imu.channel, torso.stamp_ns),),
+            time_to_event_s=self._stability.time_to_fall_s if torso.present else None,
+            measures=measures,
         )
 
     def _com_indication(self, evidence: tuple[SampleRef, ...], newest_ns: int) -> Indication:
         config, com, stability = self._config, self._com, self._stability
         severity = 0.0
         if com.present:
-            severity = ramp(abs(com.deviation_m), config.com_deviation_m, config.com_deviation_full_m)
+            full_m = com.threshold_m + config.com_deviation_full_m - config.com_deviation_m
+            severity = ramp(abs(com.deviation_m), com.threshold_m, full_m)
             if stability.capture_margin_m is not None:
                 severity = max(severity, ramp(-stability.capture_margin_m, 0.0, config.capture_margin_full_m))
-        stability.measures["com_deviation_m"] = com.deviation_m
         return Indication(
-            "com-lateral-deviation", "", newest_ns, com.present, abs(com.deviation_m), config.com_deviation_m, "m",
-            severity, evidence, stability.time_to_fall_s, stability.measures,
+            kind="com-lateral-deviation",
+            subject="",
+            stamp_ns=newest_ns,
+            present=com.present,
+            statistic=abs(com.deviation_m),
+            threshold=com.threshold_m,
+            unit="m",
+            severity=severity,
+            evidence=evidence,
+            time_to_event_s=stability.time_to_fall_s,
+            measures={"com_deviation_m": com.deviation_m, **stability.measures},
         )
 
     def _sway_indication(
@@ -236,11 +261,17 @@ class BalanceDetector:
         if not present and not full_window:
             return None
         return Indication(
-            "sway-amplitude-increase", "", newest_ns, present, ratio, config.sway_ratio, "1",
-            ramp(ratio, config.sway_ratio, config.sway_ratio_full) if present else 0.0,
-            evidence,
-            self._stability.time_to_fall_s if present else None,
-            {
+            kind="sway-amplitude-increase",
+            subject="",
+            stamp_ns=newest_ns,
+            present=present,
+            statistic=ratio,
+            threshold=config.sway_ratio,
+            unit="1",
+            severity=ramp(ratio, config.sway_ratio, config.sway_ratio_full) if present else 0.0,
+            evidence=evidence,
+            time_to_event_s=self._stability.time_to_fall_s if present else None,
+            measures={
                 "com_amplitude_m": com_m,
                 "com_nominal_m": com_nominal_m,
                 "roll_amplitude_rad": roll_rad,

@@ -162,7 +162,7 @@ def _unit(quaternion: tuple[float, float, float, float]) -> tuple[float, float, 
     x, y, z, w = quaternion
     norm = math.sqrt(x * x + y * y + z * z + w * w)
     if abs(norm - 1.0) > QUATERNION_TOLERANCE:
-        raise ValueError(f"base/odometry: orientation has norm {norm:.4f}; expected 1 within {QUATERNION_TOLERANCE:.0%}")
+        raise ValueError(f"base/odometry: orientation has norm {norm:.4f}, not 1 within {QUATERNION_TOLERANCE:.0%}")
     return x / norm, y / norm, z / norm, w / norm
 
 

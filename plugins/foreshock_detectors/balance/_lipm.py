@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from foreshock_detectors.balance._polygon import Polygon, nearest_boundary_point
+from foreshock_detectors.balance._polygon import Polygon, nearest_boundary_point, signed_margin
 
 __all__ = ["capture_time_s", "crossing_time_s", "natural_frequency", "time_to_fall_s"]
 
@@ -52,7 +52,12 @@ def crossing_time_s(com_m: float, velocity_m_s: float, edge_m: float, w0: float)
 
 
 def time_to_fall_s(
-    hull: Polygon, com: tuple[float, float], velocity: tuple[float, float], w0: float, tolerance_m: float, horizon_s: float
+    hull: Polygon,
+    com: tuple[float, float],
+    velocity: tuple[float, float],
+    w0: float,
+    tolerance_m: float,
+    horizon_s: float,
 ) -> float | None:
     """Time (s) until the centre of mass leaves the hull of both soles, or None where no fall is predicted.
 
@@ -72,13 +77,11 @@ def time_to_fall_s(
         horizon_s: a later fall is None.
     """
     x, y = com[0] + velocity[0] / w0, com[1] + velocity[1] / w0
-    ex, ey = nearest_boundary_point(hull, x, y)
-    nx, ny = x - ex, y - ey
-    distance = math.hypot(nx, ny)
+    distance = -signed_margin(hull, x, y)
     if not distance > tolerance_m:
         return None
+    ex, ey = nearest_boundary_point(hull, x, y)
+    nx, ny = x - ex, y - ey
     nx, ny = nx / distance, ny / distance
-    time_s = crossing_time_s(
-        nx * com[0] + ny * com[1], nx * velocity[0] + ny * velocity[1], nx * ex + ny * ey, w0
-    )
+    time_s = crossing_time_s(nx * com[0] + ny * com[1], nx * velocity[0] + ny * velocity[1], nx * ex + ny * ey, w0)
     return time_s if time_s <= horizon_s else None

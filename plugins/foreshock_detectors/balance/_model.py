@@ -94,7 +94,7 @@ class RobotModel:
     def _reference(self, config: BalanceConfig, srdf: Path | None) -> Any:
         if srdf is None:
             if config.held_joints:
-                raise ConfigError("balance.held_joints", "held joints need a reference configuration", "; set balance.srdf")
+                raise ConfigError("balance.held_joints", "they need a reference configuration", "; set balance.srdf")
             return pin.neutral(self.model)
         try:
             pin.loadReferenceConfigurations(self.model, os.fspath(srdf), False)

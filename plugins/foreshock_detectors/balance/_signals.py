@@ -30,6 +30,6 @@ class Hysteresis:
             self.present = True
         elif statistic < self._ratio * threshold:
             self.present = False
-        elif statistic != statistic:  # noqa: PLR0124  # the cheapest test for NaN
+        elif statistic != statistic:  # the cheapest test for NaN
             raise ValueError("statistic is not a number")
         return self.present

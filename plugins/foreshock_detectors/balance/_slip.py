@@ -27,8 +27,7 @@ class FootSlip:
     Attributes:
         slip_m: estimated horizontal displacement since the sole was set down, less what has leaked away.
         sd_m: standard deviation of that estimate on one axis.
-        observed: False after a jump or gap, until the sole is settled anew: what happened meanwhile is unknown.
-        present: the verdict.
+        observed: False at first and after a jump or gap, until the sole is settled anew: what it did is unknown.
         threshold_m: slip_m of the configuration, or slip_sigmas times sd_m where that is more.
     """
 
@@ -39,17 +38,21 @@ class FootSlip:
         self._sx = self._sy = self._rx = self._ry = 0.0
         self._ss = self._sr = self._rr = 0.0
         self._stamp_ns = 0
-        self._clear(observed=False)
+        self._loaded_ns = self._outlier_ns = -1
+        self._anchored = self.observed = False
+        self.slip_m = self.sd_m = 0.0
+        self.threshold_m = config.slip_m
 
     @property
     def present(self) -> bool:
+        """The verdict."""
         return self._hysteresis.present
 
     def lose(self) -> None:
         """The stream was interrupted or jumped: nothing is known until the sole is settled anew."""
         self._clear(observed=False)
 
-    def update(self, stamp_ns: int, sole: SolePose, loaded: bool) -> None:
+    def update(self, stamp_ns: int, sole: SolePose, *, loaded: bool) -> None:
         """Judge the sole at stamp_ns, later than the update before. It is settled once loaded for slip_settle_s."""
         if not loaded:
             self._clear(observed=True)

@@ -38,6 +38,7 @@ class Stability:
         self._sole = SoleRectangle(config)
         self._last: BodyState | None = None
         self._rate: list[float] | None = None
+        self._rate_ns = 0
         self._zmp: tuple[float, float] | None = None
         self.measures: dict[str, float] = {}
         self.capture_margin_m: float | None = None
@@ -84,7 +85,7 @@ class Stability:
         x, y = com[0] + velocity[0] / w0, com[1] + velocity[1] / w0
         measures["capture_point_x_m"], measures["capture_point_y_m"] = x, y
         margin = self.capture_margin_m = measures["capture_point_margin_m"] = signed_margin(both, x, y)
-        if margin < -config.capture_tolerance_m:
+        if margin < 0.0:
             fall = time_to_fall_s(both, com, velocity, w0, config.capture_tolerance_m, config.fall_horizon_s)
             if fall is not None:
                 self.time_to_fall_s = measures["time_to_fall_s"] = fall
@@ -105,7 +106,7 @@ class Stability:
         last = self._last
         dt = (body.stamp_ns - last.stamp_ns) / NS_PER_S if last is not None else math.inf
         if last is None or dt > self._config.gap_s:
-            self._rate = None
+            self._rate, self._rate_ns = None, body.stamp_ns
             return
         raw = [(b - a) / dt for a, b in zip(last.momentum, body.momentum, strict=True)]
         rate = self._rate
@@ -141,9 +142,10 @@ class Stability:
             zx, zy = self._zmp
             zmp = (zx + k * (zmp[0] - zx), zy + k * (zmp[1] - zy))
         self._zmp = zmp
-        motion = zmp_from_momentum(
-            body.com, (rate[0], rate[1], rate[2]), (rate[3], rate[4], rate[5]), self._mass_kg, config.gravity_m_s2, ground_z
-        )
+        force, moment = (rate[0], rate[1], rate[2]), (rate[3], rate[4], rate[5])
+        if body.stamp_ns - self._rate_ns < 3.0 * config.acceleration_filter_s * NS_PER_S:
+            return  # the filter still remembers its first, raw difference
+        motion = zmp_from_momentum(body.com, force, moment, self._mass_kg, config.gravity_m_s2, ground_z)
         if motion is not None:
             measures["zmp_disagreement_m"] = math.hypot(motion[0] - zmp[0], motion[1] - zmp[1])
 

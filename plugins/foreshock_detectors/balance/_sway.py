@@ -18,15 +18,14 @@ class Swing:
     points, each no longer than the window. So a lean that stays where it is, however large, is no sway, and neither
     is a slow shift. A turning point is a reversal by more than `reversal`, which keeps noise from making any.
 
-    Attributes:
+    Args:
+        window_s: how long an oscillation stays in view after its turning point.
         reversal: smallest reversal that counts, in the unit of the signal.
     """
 
-    __slots__ = ("_extreme", "_extreme_ns", "_half", "_oscillations", "_rising", "_turn", "_turn_ns", "_window_ns", "reversal")
-
     def __init__(self, window_s: float, reversal: float) -> None:
         self._window_ns = round(window_s * NS_PER_S)
-        self.reversal = reversal
+        self._reversal = reversal
         self.reset()
 
     def reset(self) -> None:
@@ -44,12 +43,12 @@ class Swing:
             self._turn_ns = self._extreme_ns = stamp_ns
         elif self._rising is None:
             # the first half swing has no beginning: it only sets the direction
-            if abs(value - self._turn) > self.reversal:
+            if abs(value - self._turn) > self._reversal:
                 self._rising = value > self._turn
                 self._extreme, self._extreme_ns = value, stamp_ns
         elif (value > self._extreme) if self._rising else (value < self._extreme):
             self._extreme, self._extreme_ns = value, stamp_ns
-        elif abs(value - self._extreme) > self.reversal:
+        elif abs(value - self._extreme) > self._reversal:
             self._reverse(value, stamp_ns)
         return self._amplitude(stamp_ns)
 

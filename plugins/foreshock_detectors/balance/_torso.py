@@ -22,7 +22,7 @@ class TorsoRate:
     slow estimate of its bias. That estimate is bounded, so it can hide no more than gyro_bias_limit_rad_s.
 
     Attributes:
-        rate_rad_s: the statistic, or None before the first sample.
+        rate_rad_s: the statistic; 0 before the first sample.
         stamp_ns: source time of the newest sample, -1 before the first.
     """
 
@@ -31,11 +31,12 @@ class TorsoRate:
         self._hysteresis = Hysteresis(config.release_ratio)
         self._rate: Vec3 = (0.0, 0.0, 0.0)
         self._bias: Vec3 = (0.0, 0.0, 0.0)
-        self.rate_rad_s: float | None = None
+        self.rate_rad_s = 0.0
         self.stamp_ns = -1
 
     @property
     def present(self) -> bool:
+        """The verdict."""
         return self._hysteresis.present
 
     def update(self, stamp_ns: int, imu: Imu) -> bool:

@@ -1,0 +1,54 @@
+"""Every code block of the README and of docs/ runs: python in one namespace a page, sh in one folder a page, toml parses."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from sybil import Example, Sybil
+from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser, SkipParser
+
+from tests.docs import generated
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+KNOWN = {"python", "sh", "toml", "text", "c", "json", ""}
+
+
+def run_shell(example: Example) -> None:
+    """Run a block with the environment's programs first on the path, in the page's own folder."""
+    env = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "COLUMNS": "110"}
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", example.parsed],
+        cwd=example.namespace["__folder__"],
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, f"{example.parsed}\n{done.stdout}\n{done.stderr}"
+
+
+def run_toml(example: Example) -> None:
+    """Parse a block."""
+    tomllib.loads(example.parsed)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_every_block_runs(page: Path, tmp_path: Path) -> None:
+    languages = {line.strip()[3:] for line in page.read_text().splitlines() if line.strip().startswith("```")}
+    assert languages <= KNOWN, "a block in a language that nobody runs"
+    shell, toml = CodeBlockParser("sh", run_shell), CodeBlockParser("toml", run_toml)
+    document = Sybil([PythonCodeBlockParser(), shell, toml, SkipParser()]).parse(page)
+    document.namespace["__folder__"] = tmp_path
+    for example in document.examples():
+        example.evaluate()
+
+
+def test_generated_pages_are_current() -> None:
+    assert generated.stale() == [], "run: make docs"

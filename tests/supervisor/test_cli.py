@@ -1,0 +1,94 @@
+"""The command line as a program: what it prints, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+GOOD = """
+[[detectors]]
+use = "telemetry"
+"""
+
+
+def foreshock(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", "from foreshock.cli import main; main()", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("simulat",), "did you mean 'simulate'"),
+        (("simulate", "a1-fall-onto-humn"), "did you mean 'a1-fall-onto-human'"),
+        (("simulate", "missing.toml"), "missing.toml"),
+        (("simulate", "a1-fall-onto-human", "--set", "mu_low"), "is not NAME=NUMBER"),
+        (("simulate", "a1-fall-onto-human", "--set", "mu_lo=0.1"), "did you mean 'mu_low'"),
+        (("simulate", "a1-fall-onto-human", "--policy", "lader"), "did you mean 'ladder'"),
+        (("simulate", "a1-fall-onto-human", "--twin", "fmu"), "did you mean 'fmi'"),
+        (("simulate", "a1-fall-onto-human", "--supervisor", "onn"), "'on', 'shadow', 'off'"),
+        (("config", "check", "nowhere.toml"), "nowhere.toml"),
+    ],
+)
+@pytest.mark.parametrize("as_json", [False, True])
+def test_bad_input_is_one_error_and_exit_2(words: tuple[str, ...], message: str, as_json: bool) -> None:
+    done = foreshock(*words, *(["--json"] if as_json else []))
+    assert done.returncode == 2, done.stdout + done.stderr
+    if as_json:
+        answer = json.loads(done.stdout)
+        assert answer["ok"] is False
+        assert answer["result"] is None
+        assert message in answer["errors"][0]["message"]
+    else:
+        assert message in done.stderr
+        assert done.stdout == ""
+        assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (GOOD + "[gates]\ncautoin = 0.5\n", "gates.cautoin: unknown key; did you mean 'caution'"),
+        (GOOD.replace("telemetry", "telemetri"), "no plugin 'telemetri' is installed; did you mean 'telemetry'"),
+        (GOOD + "[gates]\ncaution = 'high'\n", "gates.caution: Expected `float`, got `str`, got 'high'"),
+        (GOOD + "[gates]\ncaution = 0.1\n", "protective 0.3 <= caution 0.1 must hold"),
+        (GOOD + "[gates\n", "not TOML"),
+        (GOOD + GOOD, "'telemetry' is listed twice"),
+        ("[supervisor]\nperiod_s = 0.01\n", "missing required field `detectors`"),
+        (GOOD + "[detectors.channels]\nodometri = 'a/b'\n", "has no such input"),
+    ],
+)
+def test_a_bad_configuration_names_the_place(text: str, message: str, tmp_path: Path) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(text)
+    done = foreshock("config", "check", str(file))
+    assert done.returncode == 2
+    assert message in done.stderr.replace("\n", " ")
+
+
+def test_a_good_configuration_passes(tmp_path: Path) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(GOOD)
+    done = foreshock("config", "check", str(file), "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["result"]["detectors"] == ["telemetry"]
+
+
+def test_taxonomy_as_json() -> None:
+    answer = json.loads(foreshock("taxonomy", "show", "--json").stdout)
+    assert answer["schema"] == "foreshock/1"
+    assert [m["code"] for m in answer["result"]["taxonomy"]["modes"]] == [f"A{k}" for k in range(1, 13)]
+
+
+def test_scenarios_are_listed() -> None:
+    answer = json.loads(foreshock("scenarios", "list", "--json").stdout)
+    assert "a1-fall-onto-human" in {s["id"] for s in answer["result"]}

@@ -1,0 +1,1 @@
+"""Twins that stand for the robot and its world: FMUs."""
