@@ -27,7 +27,8 @@ def within(place: str, value: float, least: float, most: float = math.inf, *, ab
     """
     if not (math.isfinite(value) and least <= value <= most and not (above and value == least)):
         floor = f"above {least:g}" if above else f"at least {least:g}"
-        raise ConfigError(place, f"{value!r} is not a finite number {floor}" + (f" and at most {most:g}" if most < math.inf else ""))
+        ceiling = f" and at most {most:g}" if most < math.inf else ""
+        raise ConfigError(place, f"{value!r} is not a finite number {floor}{ceiling}")
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from foreshock._strict import convert, read_toml
+from foreshock._strict import convert, read_toml, within
 from foreshock.detector import DetectorSpec, Isolation
 from foreshock.errors import ConfigError
 from foreshock.evidence import Window
@@ -43,8 +43,10 @@ class SupervisorSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True
     taxonomy: str = ""
 
     def __post_init__(self) -> None:
-        if not self.period_s > 0.0:
-            raise ConfigError("supervisor.period_s", f"{self.period_s!r} is not a positive time")
+        within("supervisor.period_s", self.period_s, 1e-6)
+        within("supervisor.release_s", self.release_s, 0.0)
+        if not self.robot or "/" in self.robot:
+            raise ConfigError("supervisor.robot", f"{self.robot!r} cannot be the first part of a channel name")
 
 
 class DetectorEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -89,6 +91,8 @@ def parse_config(data: object, place: str) -> Config:
         ConfigError: names place, key path, value and nearest name of the first thing that is wrong.
     """
     config = convert(data, Config, place)
+    if not config.detectors:
+        raise ConfigError(f"{place}: detectors", "empty; a supervisor without detectors observes nothing")
     uses = [d.use for d in config.detectors]
     for use in uses:
         if uses.count(use) > 1:
@@ -103,15 +107,22 @@ def load_config(path: Path) -> Config:
 
 def config_schema(detectors: Iterable[DetectorSpec] = (), policies: Iterable[PolicySpec] = ()) -> dict[str, Any]:
     """JSON schema (2020-12) of a configuration, with the settings of these detectors and policies."""
-    schema = msgspec.json.schema(Config)
-    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    for specs, entry in ((detectors, "DetectorEntry"), (policies, "PolicyEntry")):
-        cases = []
-        for spec in specs:
-            own = msgspec.json.schema(spec.config)
-            schema["$defs"].update(own.pop("$defs"))
-            own_ref = {"config": own}
-            cases.append({"if": {"properties": {"use": {"const": spec.id}}}, "then": {"properties": own_ref}})
+    groups: dict[type, tuple[DetectorSpec | PolicySpec, ...]] = {
+        DetectorEntry: tuple(detectors),
+        PolicyEntry: tuple(policies),
+    }
+    settings = {spec.config for specs in groups.values() for spec in specs}
+    types = [Config, *groups, *sorted(settings, key=lambda t: (t.__module__, t.__qualname__))]
+    # all at once: two plugins may give their settings the same name, or one that is taken here
+    refs, components = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
+    ref_of = dict(zip(types, refs, strict=True))
+    name_of = {t: ref["$ref"].removeprefix("#/$defs/") for t, ref in ref_of.items()}
+    components[name_of[Config]]["properties"]["detectors"]["minItems"] = 1
+    for entry, specs in groups.items():
+        cases = [
+            {"if": {"properties": {"use": {"const": s.id}}}, "then": {"properties": {"config": ref_of[s.config]}}}
+            for s in specs
+        ]
         if cases:
-            schema["$defs"][entry]["allOf"] = cases
-    return schema
+            components[name_of[entry]]["allOf"] = cases
+    return {**ref_of[Config], "$defs": components, "$schema": "https://json-schema.org/draft/2020-12/schema"}

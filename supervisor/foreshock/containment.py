@@ -1,6 +1,7 @@
 """Contains plugins: feeds a detector, checks what it and a policy say. The one place with a broad except.
 
-Whatever goes wrong in a detector or its inputs makes its kinds unobserved, with a reason; never absent.
+Whatever goes wrong in a detector or its inputs makes its kinds unobserved, with a reason; never absent. SystemExit and
+the like are contained too (native bindings raise panics outside Exception); only the operator's interrupt passes.
 """
 
 from __future__ import annotations
@@ -11,14 +12,26 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
+from foreshock._strict import within
 from foreshock.clock import ns
 from foreshock.detector import Detector, DetectorSpec, Input, Inputs
 from foreshock.errors import nearest
 from foreshock.policy import ActionSpec, Policy, Proposal, Situation
-from foreshock.records import ChannelState, Indication, Sample
+from foreshock.records import ChannelState, Indication, ProtectionLevel, Sample, SampleRef
 from foreshock.taxonomy import Taxonomy
 
-__all__ = ["ChannelView", "Contained", "Outcome", "proposals_of"]
+__all__ = ["AHEAD_NS", "ChannelView", "Contained", "Outcome", "proposals_of"]
+
+AHEAD_NS = 10_000_000
+"""A stamp further ahead of the tick than this is malformed; less is the skew of two synchronised clocks."""
+
+
+def _said_by(e: BaseException) -> str:
+    """Type and message of an exception, even if its message cannot be had."""
+    try:
+        return f"{type(e).__name__}: {e}"
+    except Exception as worse:  # noqa: BLE001 # containment: the message is the plugin's code as well
+        return f"{type(e).__name__} (its message raised {type(worse).__name__})"
 
 
 def proposals_of(
@@ -29,13 +42,20 @@ def proposals_of(
     for policy in policies:
         try:
             for p in policy.propose(situation):
+                if type(p) is not Proposal:
+                    raise TypeError(f"propose() gave a {type(p).__name__} where a Proposal is expected")
                 if p.action not in actions:
                     raise ValueError(f"action {p.action!r} is not declared{nearest(p.action, actions)}")
                 if not 0.0 <= p.strength <= 1.0:
                     raise ValueError(f"strength {p.strength} of {p.action} is not within 0..1")
-                found.append(p)
-        except Exception as e:  # noqa: BLE001 # containment, as below
-            return found, f"policy {type(policy).__name__} failed: {type(e).__name__}: {e}"
+                if type(p.mode) is not str or type(p.rule) is not str:
+                    raise TypeError(f"mode {p.mode!r} and rule {p.rule!r} of {p.action} must be str")
+                level = ProtectionLevel(p.level)
+                found.append(Proposal(str(p.action), float(p.strength), level, p.mode, p.rule))
+        except KeyboardInterrupt:
+            raise
+        except BaseException as e:  # noqa: BLE001 # containment, as below
+            return found, f"policy {type(policy).__name__} failed: {_said_by(e)}"
     return found, ""
 
 
@@ -58,14 +78,25 @@ class Outcome(msgspec.Struct, frozen=True):
 
 
 class ChannelView:
-    """Newest valid sample of a channel, whether the newest was malformed, and its arrivals within a second."""
+    """Newest valid sample of a channel, whether one was malformed, and its arrivals within a second."""
 
-    __slots__ = ("arrivals", "fault", "latest")
+    __slots__ = ("arrivals", "fault", "fault_ns", "latest")
 
     def __init__(self) -> None:
         self.latest: Sample | None = None
         self.fault = ""
+        self.fault_ns = -1
         self.arrivals: deque[int] = deque()
+
+    def judge(self, fault: str, now_ns: int) -> None:
+        """Note what is wrong with a sample that arrived, if anything.
+
+        A valid sample clears a fault of an earlier tick only: of two in one tick the malformed one is still a gap.
+        """
+        if fault:
+            self.fault, self.fault_ns = fault, now_ns
+        elif self.fault and self.fault_ns < now_ns:
+            self.fault = ""
 
     def state(self, need: Input, now_ns: int, since_ns: int) -> tuple[ChannelState, str]:
         """Whether the channel serves this input now, and if not why."""
@@ -108,8 +139,13 @@ class Contained:
     ) -> None:
         self.spec, self.detector, self.inputs = spec, detector, tuple(inputs)
         self.kinds = frozenset(taxonomy.kind(k, f"detector {spec.id}").id for k in spec.kinds)
-        self._alias = {name: taxonomy.kind(name).id for name in spec.kinds}
+        self._alias = {name: k.id for k in map(taxonomy.kind, self.kinds) for name in (k.id, *k.aliases)}
         self._max_failures = max_failures
+        times = {"period_s": spec.period_s, "warm_up_s": spec.warm_up_s}
+        times |= {f"inputs.{i.name}.max_age_s": i.max_age_s for i in self.inputs}
+        times |= {f"inputs.{i.name}.min_rate_hz": i.min_rate_hz for i in self.inputs}
+        for name, value in times.items():
+            within(f"detector {spec.id}: {name}", value, 0.0)
         self._period_ns = ns(spec.period_s)
         self.pending: dict[str, list[Sample]] = {i.name: [] for i in self.inputs}
         self._start(0, 0)
@@ -125,8 +161,10 @@ class Contained:
         self._start(seed, now_ns)
         try:
             self.detector.reset(seed)
-        except Exception as e:  # noqa: BLE001 # containment: whatever a plugin raises must not end the supervisor
-            self._failures, self._why = self._max_failures, f"reset raised {type(e).__name__}: {e}"
+        except KeyboardInterrupt:
+            raise
+        except BaseException as e:  # noqa: BLE001 # containment: whatever a plugin raises must not end the supervisor
+            self._failures, self._why = self._max_failures, f"reset raised {_said_by(e)}"
         return self._why
 
     def tick(self, now_ns: int, channels: Mapping[str, ChannelView], verdict: str = "") -> Outcome:
@@ -163,8 +201,10 @@ class Contained:
         try:
             said = self.detector.update(now_ns, Inputs(latest, new))
             checked, missing = self._checked(said, now_ns)
-        except Exception as e:  # noqa: BLE001 # containment, as above
-            return self._failed(f"{type(e).__name__}: {e}", now_ns)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as e:  # noqa: BLE001 # containment, as above
+            return self._failed(_said_by(e), now_ns)
         if now_ns - self._began_ns < ns(self.spec.warm_up_s):
             return Outcome("warm-up", f"{self.spec.warm_up_s:g} s after reset")
         return Outcome("ok", "", checked, True, missing)
@@ -198,14 +238,43 @@ class Contained:
             if not (math.isfinite(i.statistic) and math.isfinite(i.threshold) and 0.0 <= i.severity <= 1.0):
                 numbers = f"statistic {i.statistic}, threshold {i.threshold}, severity {i.severity} (0..1)"
                 raise ValueError(f"{i.kind}: {numbers} are not all finite numbers")
-            if i.time_to_event_s is not None and not i.time_to_event_s >= 0.0:
-                raise ValueError(f"{i.kind}: time_to_event_s {i.time_to_event_s} is not a time from now")
-            if type(i.present) is not bool or not isinstance(i.subject, str):
-                raise TypeError(f"{i.kind}: present {i.present!r} must be a bool and subject {i.subject!r} a str")
-            if i.stamp_ns > now_ns:
+            if i.time_to_event_s is not None and not 0.0 <= i.time_to_event_s < math.inf:
+                raise ValueError(f"{i.kind}: time_to_event_s {i.time_to_event_s} is not a finite time from now")
+            if type(i.present) is not bool or type(i.subject) is not str or type(i.unit) is not str:
+                said_of = f"present {i.present!r} must be a bool, subject {i.subject!r} and unit {i.unit!r} str"
+                raise TypeError(f"{i.kind}: {said_of}")
+            if type(i.stamp_ns) is not int:
+                raise TypeError(f"{i.kind}: stamp {i.stamp_ns!r} must be an int of nanoseconds")
+            if i.stamp_ns > now_ns + AHEAD_NS:
                 raise ValueError(f"{i.kind}: stamp {i.stamp_ns} ns lies after the tick at {now_ns} ns")
             if (kind, i.subject) in subjects:
                 raise ValueError(f"{i.kind}: two indications for subject {i.subject!r}")
             subjects.add((kind, i.subject))
-            checked.append(i if i.kind == kind else msgspec.structs.replace(i, kind=kind))
+            checked.append(_plain(i, kind))
         return tuple(checked), self.kinds - {k for k, _ in subjects}
+
+
+def _plain(i: Indication, kind: str) -> Indication:
+    """An indication of builtin types under the taxonomy's id, so that journals can write it; numpy's floats are common.
+
+    Raises:
+        TypeError, ValueError: its evidence or measures are not what they must be.
+    """
+    for ref in i.evidence:
+        if type(ref) is not SampleRef or type(ref.channel) is not str or type(ref.stamp_ns) is not int:
+            raise TypeError(f"{i.kind}: evidence {ref!r} is not a SampleRef")
+    numbers = (i.statistic, i.threshold, i.severity, *i.measures.values())
+    tte = i.time_to_event_s
+    builtin = all(type(x) is float or type(x) is int for x in numbers) and (tte is None or type(tte) is float)
+    if builtin and i.kind == kind and not i.measures and type(i.evidence) is tuple:
+        return i
+    return msgspec.structs.replace(
+        i,
+        kind=kind,
+        statistic=float(i.statistic),
+        threshold=float(i.threshold),
+        severity=float(i.severity),
+        evidence=tuple(i.evidence),
+        time_to_event_s=None if tte is None else float(tte),
+        measures={str(name): float(x) for name, x in i.measures.items()},
+    )

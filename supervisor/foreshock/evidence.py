@@ -182,7 +182,7 @@ def _expire(track: Track, now_ns: int, span_ns: int) -> Track | None:
         occurrences = tuple(t for t in occurrences if t > horizon)
     if peaks and peaks[0][1] <= horizon:
         peaks = tuple(p for p in peaks if p[1] > horizon)
-    if stretches[0][1] <= horizon and not (track.present and len(stretches) == 1):
+    if stretches[0][1] <= horizon:
         stretches = tuple(s for s in stretches[:-1] if s[1] > horizon) + stretches[-1:]
     if occurrences is track.occurrences_ns and peaks is track.peaks and stretches is track.stretches:
         return track

@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from foreshock.detector import Detector, DetectorSpec, Inputs
-from foreshock.errors import BadInputError, MissingExtraError, PluginError
+from foreshock.errors import MissingExtraError, PluginError
 from foreshock.records import Indication, Sample
 
 __all__ = ["ChildDetector", "ChildError"]
@@ -51,6 +51,13 @@ _REQUEST = msgspec.msgpack.Decoder(_Reset | _Update)
 _REPLY = msgspec.msgpack.Decoder(_Said | _Raised)
 
 
+def _builtin(value: object) -> float:
+    """A float of numpy is a float, as it is in process."""
+    if isinstance(value, float):
+        return float(value)
+    raise TypeError(f"a {type(value).__name__} cannot be sent")
+
+
 def _serve(pipe: Connection, build: Callable[[Any], Detector], config: object) -> None:
     """The child: builds the detector, then answers until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -71,8 +78,11 @@ def _serve(pipe: Connection, build: Callable[[Any], Detector], config: object) -
                 detector.reset(request.seed)
                 reply: _Said | _Raised = _Said(())
             else:
-                reply = _Said(tuple(detector.update(request.now_ns, Inputs(request.latest, request.new))))
-            body = encode(reply)
+                said = detector.update(request.now_ns, Inputs(request.latest, request.new))
+                if isinstance(said, (str, bytes)) or not isinstance(said, Sequence):
+                    raise TypeError(f"update() gave {type(said).__name__}, a sequence of Indication is expected")
+                reply = _Said(tuple(said))
+            body = encode(reply, enc_hook=_builtin)
         except Exception as e:  # noqa: BLE001 # containment, as above
             body = encode(_Raised(f"{type(e).__name__}: {e}"))
         pipe.send_bytes(body)
@@ -101,8 +111,6 @@ class ChildDetector:
                 hint = f"; run: pip install 'foreshock[{spec.extra}]'" if spec.extra else ""
                 raise MissingExtraError(place, f"detector {spec.id!r}: {e}", hint) from e
             raise PluginError(place, f"detector {spec.id!r} cannot be built: {e}") from e
-        except BadInputError:
-            raise
 
     def reset(self, seed: int) -> None:
         """Reset the detector in the child, starting one if there is none."""
@@ -141,8 +149,14 @@ class ChildDetector:
         self._child = self._context.Process(
             target=_serve, args=(theirs, self._spec.build, self._config), name=f"foreshock-{self._spec.id}", daemon=True
         )
-        self._child.start()
-        theirs.close()
+        try:
+            self._child.start()
+        except Exception as e:
+            self._child = None
+            mine.close()
+            raise ChildError(f"cannot be started in a child process: {type(e).__name__}: {e}") from e
+        finally:
+            theirs.close()
         self._pipe = mine
         self._receive(START_S)
 

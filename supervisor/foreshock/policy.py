@@ -137,7 +137,7 @@ class Arbiter:
     Args:
         actions: every action that may be proposed, by id.
         release_s: a released action ramps to zero over this time, since an abrupt restart is itself a precursor.
-        step: a changed strength is announced when it moved by this much.
+        step: a strength that falls is announced when it moved by this much; one that rises always is.
     """
 
     def __init__(self, actions: Mapping[str, ActionSpec], release_s: float, step: float = 0.05) -> None:
@@ -181,7 +181,15 @@ class Arbiter:
         return keep
 
     def choose(self, proposals: Sequence[Proposal], present: frozenset[str]) -> list[Proposal]:
-        """One proposal per resource: mitigation, then level, then not worsening a present kind, then strength, id."""
+        """One proposal per resource: mitigation, then level, then not worsening a present kind, then strength, id.
+
+        Proposals of one action are one, at the highest level and strength that any of them asks for.
+        """
+        merged: dict[str, Proposal] = {}
+        for p in sorted(proposals, key=lambda p: (p.action, -p.level, -p.strength, p.mode, p.rule)):
+            first = merged.setdefault(p.action, p)
+            if p.strength > first.strength:
+                merged[p.action] = msgspec.structs.replace(first, strength=p.strength)
 
         def rank(p: Proposal) -> tuple[bool, int, bool, float, str]:
             spec = self.actions[p.action]
@@ -189,7 +197,7 @@ class Arbiter:
 
         taken: set[str] = set()
         chosen: list[Proposal] = []
-        for p in sorted(proposals, key=rank):
+        for p in sorted(merged.values(), key=rank):
             resources = self.actions[p.action].resources
             if taken.isdisjoint(resources):
                 taken.update(resources)
@@ -204,7 +212,8 @@ class Arbiter:
             return state, (), ()
         now = situation.now_ns
         present = frozenset(p.kind for p in situation.precursors if p.phase != "cleared")
-        feasible = self.feasible(state, proposals, now, situation.time_to_event_s)
+        wanted = [p for p in proposals if p.strength > 0.0]
+        feasible = self.feasible(state, wanted, now, situation.time_to_event_s)
         seen = tuple(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in situation.precursors)
         active: dict[str, Intervention] = {}
         engaged: dict[str, int] = {}
@@ -217,8 +226,14 @@ class Arbiter:
             active[p.action] = held
             engaged[p.action] = state.engaged_ns.get(p.action, now)
         releasing: dict[str, tuple[int, float]] = {}
+        taken = {r: a for a in active for r in self.actions[a].resources}
         for action, held in state.active.items():
             if action in active:
+                continue
+            successors = sorted({taken[r] for r in self.actions[action].resources if r in taken})
+            if successors:
+                reason = f"gives way to {', '.join(successors)}"
+                changes.append(Intervention(now, action, 0.0, held.mode, ("released", reason)))
                 continue
             since, full = state.releasing.get(action, (now, held.strength))
             gone = (now - since) / self._release_ns if self._release_ns else 1.0
@@ -236,4 +251,4 @@ class Arbiter:
         return ArbiterState(active, engaged, releasing), held_now, tuple(sorted(changes, key=lambda i: i.action))
 
     def _moved(self, old: float, new: float) -> bool:
-        return abs(new - old) >= self._step or (new != old and new in (0.0, 1.0))
+        return new > old or old - new >= self._step or (new != old and new == 0.0)

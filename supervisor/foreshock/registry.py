@@ -72,13 +72,13 @@ class Registry:
             raise ConfigError(place, f"no plugin {name!r} is installed", nearest(name, self.names))
         try:
             module = self._extra[name] if name in self._extra else self._points[name].load()
-        except Exception as e:
+        except (Exception, SystemExit) as e:  # a script without a main guard ends in sys.exit()
             raise PluginError(f"plugin {name}", f"import failed: {type(e).__name__}: {e}") from e
         if any(p is module for p in self._manager.get_plugins()):
             return
-        self._manager.register(module, name)
         self._refuse_unknown_hooks(name, module)
         try:
+            self._manager.register(module, name)
             self._manager.check_pending()
         except pluggy.PluginValidationError as e:
             self._manager.unregister(name=name)
@@ -155,7 +155,6 @@ class Registry:
         known = {h for h in vars(hookspecs) if h.startswith("foreshock_")}
         for attr in vars(module):
             if attr.startswith("foreshock_") and attr not in known and callable(getattr(module, attr)):
-                self._manager.unregister(name=name)
                 raise PluginError(f"plugin {name}", f"unknown hook {attr!r}", nearest(attr, known))
 
 

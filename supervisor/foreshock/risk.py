@@ -80,7 +80,9 @@ class IndependentRisk:
     def estimate(self, precursors: Sequence[Precursor]) -> RiskEstimate:
         """The risk of these precursors; each (kind, subject) is one of them."""
         if not precursors:
-            return self._none
+            none = self._none
+            # copies: whoever writes into an estimate must not move the baseline of the next
+            return RiskEstimate(0.0, 0.0, 0.0, 0.0, 0.0, dict(none.by_mode), dict(none.by_class), dict(none.counts))
         p_of = self._model.probability
         m = math.fsum(p.weight for p in precursors)
         q = math.fsum(p.occurrences for p in precursors)

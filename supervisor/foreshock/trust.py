@@ -65,7 +65,8 @@ class Gates(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not (0.0 <= self.protective <= self.caution <= 1.0):
             raise ConfigError("gates", f"protective {self.protective} <= caution {self.caution} must hold within 0..1")
         if self.latch not in LATCHES:
-            raise ConfigError("gates.latch", f"{self.latch!r} is not one of {', '.join(LATCHES)}", nearest(self.latch, LATCHES))
+            problem = f"{self.latch!r} is not one of {', '.join(LATCHES)}"
+            raise ConfigError("gates.latch", problem, nearest(self.latch, LATCHES))
         within("gates.hysteresis", self.hysteresis, 0.0, 1.0)
         within("gates.dwell_s", self.dwell_s, 0.0)
 

@@ -23,6 +23,16 @@ pytestmark = pytest.mark.filterwarnings("error")
 MASS, STIFFNESS, DAMPING, X0 = 2.0, 50.0, 1.5, 0.1  # oscillator.toml
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("fmus")
+
+
+@pytest.fixture(scope="session")
+def oscillator():
+    return Path(__file__).parents[1] / "twins" / "plants" / "oscillator"
+
+
 def closed_form(t, x0, v0, force):
     """Position and velocity of the under-damped oscillator under a constant force."""
     decay = DAMPING / (2.0 * MASS)

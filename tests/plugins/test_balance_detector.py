@@ -231,6 +231,22 @@ def test_measures_of_quiet_standing():
     assert answer[COM, ""].time_to_event_s is None
 
 
+@pytest.mark.parametrize(("share", "side"), [(1.0, 1.0), (0.0, -1.0)])
+def test_measures_of_standing_on_one_foot_with_the_capture_point_between_the_feet(share, side):
+    """The CoM rests at y = 0, 25 mm beside the stance sole and 145 mm from the outer edge of the free one."""
+    _, answer = run(Motion(left_share=lambda t: share, noise=Noise.none()), 0.3)[-1]
+    m = answer[COM, ""].measures
+    edges = sorted((0.025 * side, 0.145 * side))
+    assert (m["support_min_y_m"], m["support_max_y_m"]) == pytest.approx(edges, abs=1e-3)
+    assert m["capture_point_support_margin_m"] == pytest.approx(-0.025, abs=1e-3)
+    assert m["com_margin_m"] == pytest.approx(-0.025, abs=1e-3)
+    com = pin.centerOfMass(MODEL, MODEL.createData(), Motion().q(0.0))
+    # the capture point runs from 25 to 170 mm beside the centre of pressure at that edge
+    expected = math.log(0.170 / 0.025) / math.sqrt(9.81 / com[2])
+    assert m["time_to_capture_loss_s"] == pytest.approx(expected, rel=0.02)
+    assert answer[COM, ""].time_to_event_s is None
+
+
 def test_a_fall_is_predicted_once_the_capture_point_leaves_both_soles():
     """LIPM with the CoP at the outer edge of the left foot, streamed to the detector: the prediction counts down."""
     w0, edge = math.sqrt(9.81 / 0.866), 0.145

@@ -6,6 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import signal, stats
+
 from foreshock_detectors import _sequential as sequential
 from foreshock_detectors._sequential import (
     BandEnergy,
@@ -22,9 +26,6 @@ from foreshock_detectors._sequential import (
     severity,
     siegmund_arl,
 )
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy import signal, stats
 
 
 def test_everything_public_is_listed() -> None:
@@ -185,7 +186,8 @@ def test_running_median_starts_exact_and_bounds_an_outlier(values: list[float], 
 
 def test_hysteresis_holds_dwells_and_closes_on_nan() -> None:
     h = Hysteresis(2.0, 1.0, hold_ns=10)
-    assert [h.push(x, t) for x, t in ((1.9, 0), (2.0, 1), (1.5, 50), (0.5, 55), (0.5, 60))] == [False, True, True, True, False]
+    seen = [h.push(x, t) for x, t in ((1.9, 0), (2.0, 1), (1.5, 50), (0.5, 55), (0.5, 60))]
+    assert seen == [False, True, True, True, False]
     assert h.push(math.nan, 70)
     slow = Hysteresis(2.0, 1.0, hold_ns=0, dwell_ns=5)
     assert [slow.push(x, t) for x, t in ((3.0, 0), (3.0, 4), (3.0, 5))] == [False, False, True]

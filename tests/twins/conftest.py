@@ -7,7 +7,7 @@ import pytest
 from foreshock_twins.fmi import FmiTwinConfig, build_twin
 
 TESTS = Path(__file__).parents[1]
-OSCILLATOR = TESTS / "fmus" / "plants" / "oscillator"
+OSCILLATOR = TESTS / "twins" / "plants" / "oscillator"
 ROGUE = TESTS / "rogues" / "fmus" / "rogue"
 
 

@@ -13,7 +13,7 @@ from foreshock.messages import Detections, GripState, Heartbeat, Imu, Odometry, 
 from foreshock_twins.fmi._channels import MESSAGES
 from foreshock_twins.fmi._message_units import MESSAGE_UNITS
 
-OSCILLATOR = Path(__file__).parents[1] / "fmus" / "plants" / "oscillator"
+OSCILLATOR = Path(__file__).parent / "plants" / "oscillator"
 BINDING = (OSCILLATOR / "binding.toml").read_text()
 MS = 1_000_000
 
@@ -37,22 +37,52 @@ MISTAKES = [
     ('stamp = "sampled"', "stamp = 3.0", "channels[1].stamp", "expected a string"),
     ('force = "spring[1..3]"', 'forse = "spring[1..3]"', "channels[1].fields.forse", "did you mean 'force'"),
     ('force = "spring[1..3]"\n', "", "channels[1].fields.force", "is missing; WrenchStamped needs it"),
-    ('force = "spring[1..3]"', 'force = "spring[1..2]"', "channels[1].fields.force", "2 components; WrenchStamped.force needs 3"),
-    ('force = "spring[1..3]"', 'force = "spring[1..4]"', "channels[1].fields.force", "no variable 'spring[4]'; did you mean"),
+    (
+        'force = "spring[1..3]"',
+        'force = "spring[1..2]"',
+        "channels[1].fields.force",
+        "2 components; WrenchStamped.force needs 3",
+    ),
+    (
+        'force = "spring[1..3]"',
+        'force = "spring[1..4]"',
+        "channels[1].fields.force",
+        "no variable 'spring[4]'; did you mean",
+    ),
     ('force = "spring[1..3]"', 'force = "spring[3..1]"', "channels[1].fields.force", "empty range"),
     ('force = "spring[1..3]"', 'force = "sprung[1..3]"', "channels[1].fields.force", "did you mean 'spring[1]'"),
-    ('force = "spring[1..3]"', 'force = "torque[1..3]"', "channels[1].fields.force", "is in 'N.m'; WrenchStamped.force is in 'N'"),
-    ('force = "spring[1..3]"', 'force = ["force", 0, 0]', "channels[1].fields.force", "'force' is an input; expected an output"),
+    (
+        'force = "spring[1..3]"',
+        'force = "torque[1..3]"',
+        "channels[1].fields.force",
+        "is in 'N.m'; WrenchStamped.force is in 'N'",
+    ),
+    (
+        'force = "spring[1..3]"',
+        'force = ["force", 0, 0]',
+        "channels[1].fields.force",
+        "'force' is an input; expected an output",
+    ),
     ('force = "spring[1..3]"', "force = [nan, 0, 0]", "channels[1].fields.force", "expected a finite number"),
     ('force = "spring[1..3]"', "force = [[0], 0, 0]", "channels[1].fields.force", "expected a finite number"),
     ('frame_id = "mass"', "frame_id = 3", "channels[1].fields.frame_id", "expected a string"),
     ('position = "joint.angle[1..2]"', 'position = "joint.angle[1]"', "channels[0].fields.position", "2 joint names"),
-    ('position = "joint.angle[1..2]"', 'position = ["position", "velocity"]', "channels[0].fields.position", "'rad or m'"),
+    (
+        'position = "joint.angle[1..2]"',
+        'position = ["position", "velocity"]',
+        "channels[0].fields.position",
+        "'rad or m'",
+    ),
     ('name = ["drum", "counter"]', 'name = ["drum"]', "channels[0].fields.position", "1 joint names"),
     ('name = ["drum", "counter"]', "name = 3", "channels[0].fields.name", "expected a list of names"),
     ('name = ["drum", "counter"]', 'name = {drum = "moving_left"}', "channels[0].fields.name", "cannot change"),
     ('left = "moving_left"', 'left = "moving_lift"', "channels[2].fields.support.left", "did you mean 'moving_left'"),
-    ('left = "moving_left"', 'left = "velocity"', "channels[2].fields.support.left", "is in 'm/s'; MotionPlan.support is in '1'"),
+    (
+        'left = "moving_left"',
+        'left = "velocity"',
+        "channels[2].fields.support.left",
+        "is in 'm/s'; MotionPlan.support is in '1'",
+    ),
     ('speed = "velocity"', 'speed = "spring[1..3]"', "channels[2].fields.speed", "is one number"),
     ('speed = "velocity"', "speed = true", "channels[2].fields.speed", "expected a finite number"),
     ('template = "standing-adult"', 'template = "standing-adlt"', "channels[3].humans[0].template", "'standing-adult'"),
@@ -62,7 +92,12 @@ MISTAKES = [
     ("yaw = 3.0", "jaw = 3.0", "channels[3].humans[0].jaw", "did you mean 'yaw'"),
     ('action = "push"', 'action = "pull"', "interventions[1].action", "given twice"),
     ("force = 100.0", "forse = 100.0", "interventions[0].inputs.forse", "did you mean 'force'"),
-    ("force = 100.0", "position = 100.0", "interventions[0].inputs.position", "causality output, but an intervention sets an input"),
+    (
+        "force = 100.0",
+        "position = 100.0",
+        "interventions[0].inputs.position",
+        "causality output, but an intervention sets an input",
+    ),
     ("force = 100.0", "force = 1001.0", "interventions[0].inputs.force", "range is [-1000.0, 1000.0]"),
     ("{ force = 100.0 }", "{}", "interventions[0].inputs", "is empty"),
     ('value = "moving_left"', 'value = "moving_loft"', "events[0].value", "did you mean 'moving_left'"),
@@ -186,9 +221,7 @@ def test_every_message_type_can_be_bound(make_twin, tmp_path):
     assert values["grip"].grasping is True
     assert values["heartbeat"] == Heartbeat(1, 0.0)
     assert type(values["heartbeat"].sequence) is int
-    assert values["detections"] == Detections(
-        (messages.Detection("7", "person", 0.9, (x, 0.0, 1.0)),), frame_id="map"
-    )
+    assert values["detections"] == Detections((messages.Detection("7", "person", 0.9, (x, 0.0, 1.0)),), frame_id="map")
     assert values["humans"] == messages.Humans(())
     assert isinstance(values["scalar"], Scalar)
 

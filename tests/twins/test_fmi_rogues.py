@@ -132,7 +132,7 @@ def test_a_hang_ends_with_a_kill(child, tmp_path, version):
     process = child(version, HANG)
     with pytest.raises(subprocess.TimeoutExpired):
         process.communicate(timeout=0.3)
-    process.terminate()  # Python would handle SIGINT between byte codes, but there are none; SIGTERM's default action ends it
+    process.terminate()  # Python handles SIGINT between byte codes, but here are none; SIGTERM needs no handler
     out, _ = process.communicate(timeout=60)
     assert (process.returncode, out) == (-signal.SIGTERM, "")
     assert left_after(tmp_path) == []

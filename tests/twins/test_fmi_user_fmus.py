@@ -90,7 +90,7 @@ def mixed(request, build_mixed, make_twin, binding):
 
 
 def test_integers_booleans_and_enumerations_become_fields(mixed):
-    """The plant: count goes up by gain while enabled, force is count / 4, closed above 2, level is 1 below 3, else 2."""
+    """The plant: count grows by gain while enabled, force is count / 4, closed above 2, level is 1 below 3, else 2."""
     mixed.reset({}, 0)
     samples = mixed.advance(60 * MS)
     grips = [s.value for s in samples if isinstance(s.value, GripState)]
@@ -107,7 +107,7 @@ def test_integers_booleans_and_enumerations_become_fields(mixed):
 
 def test_integer_and_boolean_parameters_and_inputs_are_set(mixed):
     mixed.reset({"offset": 10, "inverted": 1.0}, 0)
-    grip = [s.value for s in mixed.advance(10 * MS) if isinstance(s.value, GripState)][0]
+    grip = next(s.value for s in mixed.advance(10 * MS) if isinstance(s.value, GripState))
     assert (grip.normal_force, grip.grasping) == (2.75, False)  # count 11; closed is inverted
     mixed.intervene(Intervention(0, "open", 1.0))  # enable is off: the count stands still
     assert [s.value.sequence for s in mixed.advance(30 * MS) if isinstance(s.value, Heartbeat)] == [11, 11]
@@ -135,9 +135,12 @@ def test_units_are_compared_by_meaning(build_mixed, make_twin, binding):
     kgms = ('<Unit name="N">', '<Unit name="kg.m.s-2">'), ('unit="N"', 'unit="kg.m.s-2"')
     make_twin(fmu=build_mixed(2, *kgms), binding=binding)
     kilo = ('<BaseUnit kg="1" m="1" s="-2"/>', '<BaseUnit kg="1" m="1" s="-2" factor="1000.0"/>')
-    with pytest.raises(ConfigError, match="variable 'force' is in 'N'; GripState.normal_force is in 'N'"):
+    with pytest.raises(ConfigError, match=r"variable 'force' is in 'N'; GripState\.normal_force is in 'N'"):
         make_twin(fmu=build_mixed(2, kilo), binding=binding)
-    unknown = ('<Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit>', '<Unit name="pull"/>'), ('unit="N"', 'unit="pull"')
+    unknown = (
+        ('<Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit>', '<Unit name="pull"/>'),
+        ('unit="N"', 'unit="pull"'),
+    )
     with pytest.raises(ConfigError, match="is in 'pull'"):
         make_twin(fmu=build_mixed(2, *unknown), binding=binding)
 
@@ -151,12 +154,10 @@ def test_a_fixed_internal_step_is_respected(build_mixed, make_twin, binding):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_an_fmu_for_other_platforms_says_which(build_mixed, make_twin, binding, version):
-    import os
-
-    before = os.getcwd()
+    before = Path.cwd()
     with pytest.raises(ConfigError, match="it holds binaries for win64"):
         make_twin(fmu=build_mixed(version, binary=False), binding=binding)
-    assert os.getcwd() == before
+    assert Path.cwd() == before
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -187,7 +188,7 @@ def test_a_zip_without_description_is_no_fmu(make_twin, tmp_path, binding):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_a_fatal_status_gives_a_new_instance_at_reset(build_mixed, make_twin, binding, version):
-    """After a fatal status no function may be called on the instance any more, not even reset (the plant aborts if so)."""
+    """After a fatal status no function may be called on the instance, not even reset (the plant aborts if so)."""
     twin = make_twin(fmu=build_mixed(version), binding=binding)
     twin.reset({"offset": -100}, 0)  # the plant takes this as an order to fail fatally
     with pytest.raises(TwinError, match="gave fatal") as caught:

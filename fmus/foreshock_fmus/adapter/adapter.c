@@ -46,10 +46,10 @@ static bool allowed(const Instance *self, Mode mode, const char *call) {
 
 static Outcome from_plant(Instance *self, int answer, const char *call) {
     if (answer == PLANT_OK) return OUTCOME_OK;
+    const Outcome outcome = answer == PLANT_DISCARD ? OUTCOME_DISCARD : OUTCOME_ERROR;
+    if (outcome == OUTCOME_ERROR) self->mode = MODE_FAILED;
     const char *message = plant_message(self->plant);
-    if (answer == PLANT_DISCARD) return adapter_say(self, OUTCOME_DISCARD, "%s at t = %.9g s: %.400s", call, self->time, message);
-    self->mode = MODE_FAILED;
-    return adapter_say(self, OUTCOME_ERROR, "%s at t = %.9g s: %.400s", call, self->time, message);
+    return adapter_say(self, outcome, "%s at t = %.9g s: %.400s", call, self->time, message);
 }
 
 static void forget(Instance *self) {
@@ -131,7 +131,7 @@ Outcome adapter_step(Instance *self, double t, double h) {
     if (!(h > 0.0) || !isfinite(h)) return adapter_say(self, OUTCOME_ERROR, "the step size is %g s; it must be > 0", h);
     /* A few ulp of rounding in the importer's own sum are no jump in time. */
     if (!(fabs(t - self->time) <= 1e-6 * h + 1e-12 * fabs(t)))
-        return adapter_say(self, OUTCOME_ERROR, "a step from t = %.17g s, but the plant is at t = %.17g s", t, self->time);
+        return adapter_say(self, OUTCOME_ERROR, "a step from t = %.17g s, but the plant is at %.17g s", t, self->time);
     Outcome outcome = from_plant(self, plant_step(self->plant, self->vars, t, h), "step");
     if (outcome == OUTCOME_OK) self->time = t + h;
     return outcome;
@@ -139,14 +139,15 @@ Outcome adapter_step(Instance *self, double t, double h) {
 
 Outcome adapter_get(Instance *self, const unsigned int refs[], size_t n, double values[]) {
     if (self == NULL) return OUTCOME_ERROR;
-    if (self->mode == MODE_FAILED) return adapter_say(self, OUTCOME_ERROR, "reading variables is not allowed when failed");
+    if (self->mode == MODE_FAILED) return adapter_say(self, OUTCOME_ERROR, "reading is not allowed when failed");
     if (self->mode == MODE_INITIALIZATION) {
         Outcome outcome = initialize(self);
         if (outcome != OUTCOME_OK) return outcome;
     }
     for (size_t i = 0; i < n; i++) {
         const unsigned int ref = refs[i];
-        if (ref > TIME_REFERENCE) return adapter_say(self, OUTCOME_ERROR, "there is no variable with value reference %u", ref);
+        if (ref > TIME_REFERENCE)
+            return adapter_say(self, OUTCOME_ERROR, "there is no variable with value reference %u", ref);
         if (self->mode == MODE_INSTANTIATED && ref < N_VARS && plant_causality[ref] == CAUSALITY_OUTPUT)
             return adapter_say(self, OUTCOME_ERROR, "output %s has no value before initialization", plant_name[ref]);
         values[i] = ref == TIME_REFERENCE ? self->time : self->vars[ref];
@@ -156,15 +157,19 @@ Outcome adapter_get(Instance *self, const unsigned int refs[], size_t n, double 
 
 Outcome adapter_set(Instance *self, const unsigned int refs[], size_t n, const double values[]) {
     if (self == NULL) return OUTCOME_ERROR;
-    if (self->mode > MODE_STEP) return adapter_say(self, OUTCOME_ERROR, "setting variables is not allowed when %s", mode_name[self->mode]);
+    if (self->mode > MODE_STEP)
+        return adapter_say(self, OUTCOME_ERROR, "setting variables is not allowed when %s", mode_name[self->mode]);
     for (size_t i = 0; i < n; i++) { /* all are checked before the first is set */
         const unsigned int ref = refs[i];
-        if (ref >= N_VARS) return adapter_say(self, OUTCOME_ERROR, "there is no settable variable with value reference %u", ref);
-        if (plant_causality[ref] == CAUSALITY_OUTPUT) return adapter_say(self, OUTCOME_ERROR, "output %s cannot be set", plant_name[ref]);
+        if (ref >= N_VARS)
+            return adapter_say(self, OUTCOME_ERROR, "there is no settable variable with value reference %u", ref);
+        if (plant_causality[ref] == CAUSALITY_OUTPUT)
+            return adapter_say(self, OUTCOME_ERROR, "output %s cannot be set", plant_name[ref]);
         if (plant_causality[ref] == CAUSALITY_PARAMETER && self->mode == MODE_STEP)
             return adapter_say(self, OUTCOME_ERROR, "parameter %s is fixed after initialization", plant_name[ref]);
         if (!isfinite(values[i]) || !(values[i] >= plant_min[ref] && values[i] <= plant_max[ref]))
-            return adapter_say(self, OUTCOME_ERROR, "%s = %g is outside [%g, %g]", plant_name[ref], values[i], plant_min[ref], plant_max[ref]);
+            return adapter_say(self, OUTCOME_ERROR, "%s = %g is outside [%g, %g]", plant_name[ref], values[i],
+                               plant_min[ref], plant_max[ref]);
     }
     for (size_t i = 0; i < n; i++) self->vars[refs[i]] = values[i];
     self->stale = self->stale || self->mode != MODE_STEP;
@@ -200,7 +205,8 @@ Outcome adapter_state_set(Instance *self, const void *state) {
 
 Outcome adapter_state_serialize(Instance *self, const void *state, void *bytes, size_t size) {
     if (self == NULL || state == NULL || bytes == NULL) return OUTCOME_ERROR;
-    if (size < adapter_state_size()) return adapter_say(self, OUTCOME_ERROR, "the state needs %zu bytes, not %zu", adapter_state_size(), size);
+    if (size < adapter_state_size())
+        return adapter_say(self, OUTCOME_ERROR, "the state needs %zu bytes, not %zu", adapter_state_size(), size);
     memcpy(bytes, state, adapter_state_size());
     return OUTCOME_OK;
 }
@@ -208,7 +214,7 @@ Outcome adapter_state_serialize(Instance *self, const void *state, void *bytes, 
 Outcome adapter_state_deserialize(Instance *self, const void *bytes, size_t size, void **state) {
     if (self == NULL || bytes == NULL || state == NULL) return OUTCOME_ERROR;
     const State *head = bytes;
-    if (size != adapter_state_size() || strncmp(head->token, plant_token, TOKEN_SIZE) != 0)
+    if (size != adapter_state_size() || strncmp(head->token, plant_token, TOKEN_SIZE) != 0) /* chars: any alignment */
         return adapter_say(self, OUTCOME_ERROR, "the serialized state is not of this build of the plant");
     if (*state == NULL) *state = calloc(1, size);
     if (*state == NULL) return adapter_say(self, OUTCOME_ERROR, "no memory for the state");

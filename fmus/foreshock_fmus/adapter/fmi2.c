@@ -1,4 +1,5 @@
-/* FMI 2.0.4 co-simulation over the adapter; model exchange functions are exported, as importers look for them, and refuse. */
+/* FMI 2.0.4 co-simulation over the adapter. Model exchange functions are exported, as importers look for them, but
+ * refuse. */
 #include <string.h>
 
 #include "adapter.h"
@@ -133,13 +134,13 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2S
     return c == NULL ? fmi2Error : fmi2Discard;
 }
 
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
-                                       const fmi2Real value[]) {
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
     (void)vr, (void)n, (void)order, (void)value;
     return UNSUPPORTED(c);
 }
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
-                                        fmi2Real value[]) {
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                        const fmi2Integer order[], fmi2Real value[]) {
     (void)vr, (void)n, (void)order, (void)value;
     return UNSUPPORTED(c);
 }
@@ -150,7 +151,8 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     return UNSUPPORTED(c);
 }
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return UNSUPPORTED(c); }
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2Boolean *enter_event, fmi2Boolean *terminate) {
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2Boolean *enter_event,
+                                       fmi2Boolean *terminate) {
     (void)no_set, (void)enter_event, (void)terminate;
     return UNSUPPORTED(c);
 }

@@ -1,5 +1,5 @@
-/* FMI 3.0 co-simulation over the adapter; what a co-simulation FMU does not offer is exported, as importers look for it, and
- * refuses. */
+/* FMI 3.0 co-simulation over the adapter. What a co-simulation FMU does not offer is exported, as importers look for
+ * it, but refuses. */
 #include <string.h>
 
 #include "adapter.h"
@@ -32,7 +32,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          const fmi3ValueReference intermediate[], size_t n_intermediate,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                                          fmi3IntermediateUpdateCallback update) {
-    (void)resources, (void)visible, (void)logging, (void)early_return, (void)intermediate, (void)n_intermediate, (void)update;
+    (void)resources, (void)visible, (void)logging, (void)early_return, (void)update;
+    (void)intermediate, (void)n_intermediate;
     Instance *self = adapter_new(name, token, log_message, (AnyFunction *)logger, environment);
     if (self != NULL && event_mode) {
         adapter_say(self, OUTCOME_ERROR, "this FMU has no event mode (hasEventMode is false)");
@@ -47,8 +48,9 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
     (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)environment, (void)logger;
     return NULL;
 }
-fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
-                                               fmi3Boolean logging, fmi3InstanceEnvironment environment,
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
+                                               fmi3Boolean visible, fmi3Boolean logging,
+                                               fmi3InstanceEnvironment environment,
                                                fmi3LogMessageCallback logger, fmi3ClockUpdateCallback clock,
                                                fmi3LockPreemptionCallback lock, fmi3UnlockPreemptionCallback unlock) {
     (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)environment, (void)logger;
@@ -57,8 +59,8 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
 }
 void fmi3FreeInstance(fmi3Instance c) { adapter_free(c); }
 
-fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance, fmi3Float64 start,
-                                       fmi3Boolean stop_defined, fmi3Float64 stop) {
+fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
+                                       fmi3Float64 start, fmi3Boolean stop_defined, fmi3Float64 stop) {
     (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
     return status(adapter_enter_initialization(c, start));
 }
@@ -67,11 +69,13 @@ fmi3Status fmi3Terminate(fmi3Instance c) { return status(adapter_terminate(c)); 
 fmi3Status fmi3Reset(fmi3Instance c) { return status(adapter_reset(c)); }
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, REFS, fmi3Float64 values[], size_t n_values) {
-    if (n_values != n_refs) return status(adapter_say(c, OUTCOME_ERROR, "%zu values for %zu scalars", n_values, n_refs));
+    if (n_values != n_refs)
+        return status(adapter_say(c, OUTCOME_ERROR, "%zu values for %zu scalars", n_values, n_refs));
     return status(adapter_get(c, refs, n_refs, values));
 }
 fmi3Status fmi3SetFloat64(fmi3Instance c, REFS, const fmi3Float64 values[], size_t n_values) {
-    if (n_values != n_refs) return status(adapter_say(c, OUTCOME_ERROR, "%zu values for %zu scalars", n_values, n_refs));
+    if (n_values != n_refs)
+        return status(adapter_say(c, OUTCOME_ERROR, "%zu values for %zu scalars", n_values, n_refs));
     return status(adapter_set(c, refs, n_refs, values));
 }
 
@@ -137,10 +141,12 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
 
 fmi3Status fmi3EnterStepMode(fmi3Instance c) { return UNSUPPORTED(c); /* belongs to event mode */ }
 
-fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_set_state_prior, fmi3Boolean *event_needed,
-                      fmi3Boolean *terminate, fmi3Boolean *early_return, fmi3Float64 *last_time) {
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_set_state_prior,
+                      fmi3Boolean *event_needed, fmi3Boolean *terminate, fmi3Boolean *early_return,
+                      fmi3Float64 *last_time) {
     (void)no_set_state_prior;
-    if (c == NULL || event_needed == NULL || terminate == NULL || early_return == NULL || last_time == NULL) return fmi3Error;
+    if (c == NULL || event_needed == NULL || terminate == NULL) return fmi3Error;
+    if (early_return == NULL || last_time == NULL) return fmi3Error;
     Outcome outcome = adapter_step(c, t, h);
     *event_needed = *terminate = *early_return = fmi3False;
     *last_time = ((Instance *)c)->time;
@@ -159,18 +165,20 @@ fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReferenc
     (void)ref, (void)n;
     return UNSUPPORTED(c);
 }
-fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference ref, size_t dependent[], fmi3ValueReference independents[],
-                                       size_t independent[], fmi3DependencyKind kinds[], size_t n) {
+fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference ref, size_t dependent[],
+                                       fmi3ValueReference independents[], size_t independent[],
+                                       fmi3DependencyKind kinds[], size_t n) {
     (void)ref, (void)dependent, (void)independents, (void)independent, (void)kinds, (void)n;
     return UNSUPPORTED(c);
 }
 
-#define NO_DERIVATIVE(name)                                                                                                  \
-    fmi3Status name(fmi3Instance c, const fmi3ValueReference unknowns[], size_t n_unknowns, const fmi3ValueReference knowns[], \
-                    size_t n_knowns, const fmi3Float64 seed[], size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity) { \
-        (void)unknowns, (void)n_unknowns, (void)knowns, (void)n_knowns, (void)seed, (void)n_seed;                              \
-        (void)sensitivity, (void)n_sensitivity;                                                                                \
-        return UNSUPPORTED(c);                                                                                                 \
+#define NO_DERIVATIVE(name)                                                                            \
+    fmi3Status name(fmi3Instance c, const fmi3ValueReference unknowns[], size_t n_unknowns,            \
+                    const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[],      \
+                    size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity) {                  \
+        (void)unknowns, (void)n_unknowns, (void)knowns, (void)n_knowns, (void)seed, (void)n_seed;      \
+        (void)sensitivity, (void)n_sensitivity;                                                        \
+        return UNSUPPORTED(c);                                                                         \
     }
 NO_DERIVATIVE(fmi3GetDirectionalDerivative)
 NO_DERIVATIVE(fmi3GetAdjointDerivative)
@@ -214,7 +222,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *needed, fmi3Boo
     (void)needed, (void)terminate, (void)nominals, (void)values, (void)next_defined, (void)next;
     return UNSUPPORTED(c);
 }
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set, fmi3Boolean *enter_event, fmi3Boolean *terminate) {
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set, fmi3Boolean *enter_event,
+                                       fmi3Boolean *terminate) {
     (void)no_set, (void)enter_event, (void)terminate;
     return UNSUPPORTED(c);
 }
@@ -247,7 +256,8 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
     *n = 0;
     return fmi3OK;
 }
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, REFS, const fmi3Int32 orders[], fmi3Float64 values[], size_t n_values) {
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, REFS, const fmi3Int32 orders[], fmi3Float64 values[],
+                                    size_t n_values) {
     NO_REFS, (void)orders, (void)values, (void)n_values;
     return UNSUPPORTED(c);
 }

@@ -55,9 +55,10 @@ def build_twin(scenario: Scenario, registry: Registry, scratch: Path) -> Twin:
     place = f"{scenario.id}: twin"
     spec = registry.twin(scenario.twin["kind"], f"{place}.kind")
     table = {k: v for k, v in scenario.twin.items() if k != "kind"}
-    for key in ("fmu", "binding"):
-        if isinstance(table.get(key), str) and table[key]:
-            table[key] = str(Path(scenario.folder) / table[key])
+    for key in ("fmu", "binding", "plant"):
+        value = table.get(key)
+        if isinstance(value, str) and value and (key != "plant" or "/" in value):
+            table[key] = str(Path(scenario.folder) / value)
     scratch.mkdir(parents=True, exist_ok=True)
     return spec.build(convert(table, spec.config, place), scenario.supervisor().supervisor.robot, scratch)
 

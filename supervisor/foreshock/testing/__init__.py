@@ -22,7 +22,7 @@ __all__ = [
     "duplicated",
     "not_a_number",
     "silenced",
-    "spoiled",
     "spec_checks",
+    "spoiled",
     "threshold_spec",
 ]

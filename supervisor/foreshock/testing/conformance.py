@@ -10,10 +10,11 @@ pytest collects the inherited tests; this module itself does not import pytest. 
 the real supervisor, so that what is tested is what a robot will get.
 """
 
+# ruff: noqa: S101 # these are tests; each assert carries its message, since pytest rewrites no asserts here
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -24,7 +25,7 @@ from foreshock.detector import DetectorSpec, Input
 from foreshock.messages import is_finite
 from foreshock.records import Decision, Sample
 from foreshock.supervisor import build_detector
-from foreshock.taxonomy import PrecursorKind, Taxonomy, builtin_taxonomy
+from foreshock.taxonomy import PrecursorKind, builtin_taxonomy
 from foreshock.testing._purity import Purity
 from foreshock.testing.faults import disordered, duplicated, silenced, spoiled
 from foreshock.testing.rig import Call, Play, Rig, arrival_ns
@@ -72,7 +73,8 @@ class DetectorConformance:
     def test_declares_itself(self) -> None:
         """Id, kinds, inputs, settings and build are as the port demands."""
         checks = spec_checks(self.spec, self.precursors, self.config)
-        assert [f"{c.name}: {c.problem}" for c in checks if not c.ok] == []
+        broken = [f"{c.name}: {c.problem}" for c in checks if not c.ok]
+        assert not broken, "\n".join(broken)
 
     def test_recording_is_usable(self) -> None:
         """The recording is ordered, finite, short, and has every input of the declared type."""
@@ -92,14 +94,16 @@ class DetectorConformance:
         """The recording makes each declared kind present, and the detector can also say that it is absent."""
         said = [i for d in self._play.decisions for i in d.indications]
         problem = self._first_problem(self._play)
+        hint = f"; {problem}" if problem else ""
         never = [k for k in sorted(self._kinds) if k not in {i.kind for i in said if i.present}]
-        assert not never, f"never present in the recording: {', '.join(never)}{problem}"
+        assert not never, f"never present in the recording: {', '.join(never)}{hint}"
         stuck = [k for k in sorted(self._kinds) if k not in {i.kind for i in said if not i.present}]
-        assert not stuck, f"never absent in the recording: {', '.join(stuck)}{problem}"
+        assert not stuck, f"never absent in the recording: {', '.join(stuck)}"
 
     def test_every_update_is_valid(self) -> None:
         """No update raises, and each is accepted: declared kinds, finite numbers, severity 0..1, no future stamps."""
-        assert self._first_problem(self._play) == ""
+        problem = self._first_problem(self._play)
+        assert not problem, problem
         given = {(s.channel, s.stamp_ns) for s in self._samples}
         for call in self._play.calls:
             for i in call.said or ():
@@ -113,15 +117,16 @@ class DetectorConformance:
         """While it has its inputs and is warm, it reports each declared kind, or omits() says why not."""
         unknown = [k for k in self.omits if k not in self._kinds]
         assert not unknown, f"omits names {unknown}, which the detector does not declare"
-        for d in self._play.decisions:
-            said = {i.kind for i in d.indications}
-            silent = self._kinds - said - self.omits.keys() if said else frozenset()
-            assert not silent, f"at {d.now_ns} ns it says nothing of {', '.join(sorted(silent))}, nor does `omits`"
+        ids, warm_ns = self._ids, self._began_ns + ns(self.spec.warm_up_s)
+        for call in self._play.calls:
+            said = {ids.get(i.kind, i.kind) for i in call.said or ()}
+            silent = sorted(self._kinds - said - self.omits.keys()) if call.now_ns >= warm_ns else ()
+            assert not silent, f"at {call.now_ns} ns it says nothing of {', '.join(silent)}, nor does `omits`"
 
     def test_same_input_same_output(self) -> None:
         """Two detectors with the same samples say the same."""
         again = self._rig.play(self._samples)
-        assert _first_difference(self._play.decisions, again.decisions) == ""
+        _assert_same(self._play.decisions, again.decisions)
 
     def test_reset_equals_new(self) -> None:
         """After reset() a detector behaves like a new one."""
@@ -129,7 +134,7 @@ class DetectorConformance:
         with rig.supervisor() as (supervisor, _):
             rig.run(supervisor, self._samples)
             again = rig.run(supervisor, self._samples)
-        assert _first_difference(self._play.decisions, again) == ""
+        _assert_same(self._play.decisions, again)
 
     def test_reads_no_clock_no_global_randomness_no_files(self) -> None:
         """Clocks, random and numpy.random module functions, files and sockets refuse while it works."""
@@ -139,7 +144,7 @@ class DetectorConformance:
         with purity.watching(code):
             pure = self._rig.play(self._samples, armed=purity.armed)
         assert purity.asked == [], f"called while the detector worked: {', '.join(sorted(set(purity.asked)))}"
-        assert _first_difference(self._play.decisions, pure.decisions) == ""
+        _assert_same(self._play.decisions, pure.decisions)
 
     def test_changes_neither_inputs_nor_past_answers(self) -> None:
         """What it is given and what it has said stays as it was."""
@@ -159,14 +164,19 @@ class DetectorConformance:
         channel = rig.channel(lost_input)
         samples = (silenced if loss == "silent" else spoiled)(self._samples, channel, at_ns)
         play = rig.play(samples, until_ns=arrival_ns(self._samples[-1]))
-        assert self._first_problem(play, unobserved_is_fine=True) == ""
+        problem = self._first_problem(play, unobserved_is_fine=True)
+        assert not problem, f"without {lost_input} ({loss}): {problem}"
         full = {d.now_ns: {(i.kind, i.subject): i.present for i in d.indications} for d in self._play.decisions}
+        held = {key for key, present in full[at_ns].items() if present}
+        stale_ns = at_ns + ns(need.max_age_s)
         for d in play.decisions:
             if d.now_ns <= at_ns:
                 continue
-            for i in d.indications:
-                cleared = full.get(d.now_ns, {}).get((i.kind, i.subject), False) and not i.present
-                assert not cleared, f"without {lost_input} ({loss}) it says at {d.now_ns} ns that {i.kind} is absent"
+            present = {key for key, there in full.get(d.now_ns, {}).items() if there}
+            held &= present | {key for key in held if key not in full.get(d.now_ns, {})}
+            cleared = {(i.kind, i.subject) for i in d.indications if not i.present}
+            wrong = cleared & (present if d.now_ns > stale_ns else held)
+            assert not wrong, f"without {lost_input} ({loss}) it says at {d.now_ns} ns that {sorted(wrong)} are absent"
         if need.required:
             self._assert_unobserved(play.decisions, need, at_ns, loss)
 
@@ -187,7 +197,8 @@ class DetectorConformance:
         """A transport that repeats and reorders samples neither breaks it nor hides a kind."""
         for fault in (duplicated, disordered):
             play = self._rig.play(fault(self._samples))
-            assert self._first_problem(play) == "", fault.__name__
+            problem = self._first_problem(play)
+            assert not problem, f"{fault.__name__} samples: {problem}"
             hidden = sorted(self._kinds - play.present)
             assert not hidden, f"{', '.join(hidden)} is not found in {fault.__name__} samples"
 
@@ -199,16 +210,21 @@ class DetectorConformance:
     def test_says_the_same_in_a_child_process(self) -> None:
         """With isolation = "process" the answers are the same."""
         child = self._rig.play(self._samples, isolation="process")
-        assert _first_difference(self._play.decisions, child.decisions) == ""
+        _assert_same(self._play.decisions, child.decisions)
 
     @property
     def _rig(self) -> Rig:
         return Rig(self.spec, self.config, self.precursors, self.robot, self.tick_s)
 
     @property
+    def _ids(self) -> Mapping[str, str]:
+        """Declared name of a kind -> its id."""
+        taxonomy = builtin_taxonomy().extended(self.precursors)
+        return {name: taxonomy.kind(name).id for name in self.spec.kinds}
+
+    @property
     def _kinds(self) -> frozenset[str]:
-        taxonomy: Taxonomy = builtin_taxonomy().extended(self.precursors)
-        return frozenset(taxonomy.kind(k).id for k in self.spec.kinds)
+        return frozenset(self._ids.values())
 
     def _once(self) -> tuple[tuple[Sample, ...], Play]:
         """The recording and its undisturbed play, made once for all tests of a class."""
@@ -238,33 +254,31 @@ class DetectorConformance:
         assert most > 0, "nothing is ever present in the recording"
         return next(t for n, t in counts if n == most)
 
+    @property
+    def _began_ns(self) -> int:
+        return self._play.decisions[0].now_ns - ns(self.tick_s)
+
     def _first_problem(self, play: Play, unobserved_is_fine: bool = False) -> str:
-        """The first update that raised or was refused, and otherwise the first tick without its inputs."""
+        """The first update that raised or was refused, or the first warm tick without an input; empty if none."""
         raised: Call | None = next((c for c in play.calls if c.error), None)
         if raised is not None:
-            return f"; the update at {raised.now_ns} ns raised {raised.error}"
-        for d, h in self._news(play.decisions):
-            if h.state == "failed" or (h.state == "unobserved" and not unobserved_is_fine and self._warm(d)):
-                return f"; at {d.now_ns} ns it is {h.state}: {h.reason}"
-        return ""
-
-    def _news(self, decisions: Sequence[Decision]) -> Iterator[tuple[Decision, Any]]:
-        for d in decisions:
+            return f"the update at {raised.now_ns} ns raised {raised.error}"
+        warm_ns = self._began_ns + max(ns(self.spec.warm_up_s), ns(1.0))
+        state, reason = "ok", ""
+        for d in play.decisions:
             for h in d.health:
                 if h.source == self.spec.id:
-                    yield d, h
+                    state, reason = h.state, h.reason
+            lost = state == "unobserved" and not unobserved_is_fine and d.now_ns >= warm_ns
+            if state == "failed" or lost:
+                return f"at {d.now_ns} ns it is {state}: {reason}"
+        return ""
 
-    def _warm(self, decision: Decision) -> bool:
-        began_ns = self._play.decisions[0].now_ns
-        return decision.now_ns - began_ns >= max(ns(self.spec.warm_up_s), ns(1.0))
 
-
-def _first_difference(a: Sequence[Decision], b: Sequence[Decision]) -> str:
-    """Where two plays part; empty if they do not."""
+def _assert_same(a: Sequence[Decision], b: Sequence[Decision]) -> None:
     for one, other in zip(a, b, strict=True):
-        if one.indications != other.indications:
-            return f"at {one.now_ns} ns: {one.indications} against {other.indications}"
-        if one.trust.unobserved != other.trust.unobserved:
-            reasons = "; ".join(h.reason for h in (*one.health, *other.health))
-            return f"at {one.now_ns} ns unobserved: {one.trust.unobserved} against {other.trust.unobserved}; {reasons}"
-    return ""
+        told, again = one.indications, other.indications
+        assert told == again, f"at {one.now_ns} ns: {told} against {again}"
+        lost, also = one.trust.unobserved, other.trust.unobserved
+        reasons = "; ".join(h.reason for h in (*one.health, *other.health))
+        assert lost == also, f"at {one.now_ns} ns unobserved: {lost} against {also}; {reasons}"

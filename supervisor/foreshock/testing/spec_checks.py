@@ -18,7 +18,7 @@ from foreshock.messages import AnyMessage
 from foreshock.supervisor import build_detector, inputs_of
 from foreshock.taxonomy import PrecursorKind, Taxonomy, builtin_taxonomy
 
-__all__ = ["Check", "KEBAB", "spec_checks"]
+__all__ = ["KEBAB", "Check", "spec_checks"]
 
 KEBAB = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 """An id: lower-case words joined by hyphens."""

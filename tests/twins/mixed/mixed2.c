@@ -62,7 +62,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
     Mixed *m = c;
     if (m->offset == -100) {
         m->dead = true;
-        ((fmi2CallbackLogger)m->logger)(m->environment, "mixed", fmi2Fatal, "logStatusFatal", "offset is %d", m->offset);
+        fmi2CallbackLogger say = (fmi2CallbackLogger)m->logger;
+        say(m->environment, "mixed", fmi2Fatal, "logStatusFatal", "offset is %d", m->offset);
         return fmi2Fatal;
     }
     advance(m);

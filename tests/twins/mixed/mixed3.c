@@ -14,7 +14,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early,
                                          const fmi3ValueReference refs[], size_t n, fmi3InstanceEnvironment environment,
                                          fmi3LogMessageCallback logger, fmi3IntermediateUpdateCallback update) {
-    (void)name, (void)resources, (void)visible, (void)logging, (void)event_mode, (void)early, (void)refs, (void)n, (void)update;
+    (void)name, (void)resources, (void)visible, (void)logging, (void)event_mode, (void)early;
+    (void)refs, (void)n, (void)update;
     if (strcmp(token, "{mixed}") != 0) return NULL;
     Mixed *m = calloc(1, sizeof *m);
     m->environment = environment;
@@ -26,7 +27,8 @@ void fmi3FreeInstance(fmi3Instance c) {
     if (((Mixed *)c)->dead) abort();
     free(c);
 }
-fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean a, fmi3Float64 b, fmi3Float64 d, fmi3Boolean e, fmi3Float64 f) {
+fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean a, fmi3Float64 b, fmi3Float64 d, fmi3Boolean e,
+                                       fmi3Float64 f) {
     (void)a, (void)b, (void)d, (void)e, (void)f;
     return c ? fmi3OK : fmi3Error;
 }
@@ -56,8 +58,8 @@ SET(fmi3SetInt32, fmi3Int32, m->offset)
 SET(fmi3SetInt8, fmi3Int8, m->gain)
 SET(fmi3SetBoolean, fmi3Boolean, *(vr[i] == 6 ? &m->inverted : &m->enable))
 
-fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_set, fmi3Boolean *event, fmi3Boolean *terminate,
-                      fmi3Boolean *early, fmi3Float64 *last) {
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_set, fmi3Boolean *event,
+                      fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *last) {
     (void)no_set;
     Mixed *m = c;
     *event = *terminate = *early = false;

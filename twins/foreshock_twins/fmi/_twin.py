@@ -39,6 +39,7 @@ class FmuTwin:
     ) -> None:
         self._variables, self._binding, self._instance, self._log = variables, binding, instance, log
         self._channels = tuple(Channel(c.name, c.type, c.every * binding.step_ns) for c in binding.channels)
+        self._actions = frozenset(binding.actions)
         self._makers: list[tuple[int, str, Reader, Reader | None]] = [
             (c.every, f"{robot}/{c.name}", c.message.reader(layout), layout.number(c.stamp) if c.stamp else None)
             for c in binding.channels
@@ -71,7 +72,7 @@ class FmuTwin:
     @property
     def actions(self) -> frozenset[str]:
         """The actions of the binding."""
-        return frozenset(self._binding.actions)
+        return self._actions
 
     def reset(self, parameters: Parameters, seed: int) -> None:
         """Back to time 0. The seed goes to the binding's seed parameter, modulo what its type can hold.

@@ -121,12 +121,12 @@ void control_tick(Plant *self, const double *vars, double t, double tick) {
     self->delay[self->delay_at] = (Measurement){
         y - base + vars[V_com_bias] + self->estimate_v / w + self->dcm_noise, y - base, x[X_ROLL], x[X_RATE]};
     Measurement m = self->delay[(self->delay_at + DELAY_SIZE - CLIP(behind, 0, DELAY_SIZE - 1)) % DELAY_SIZE];
-    double kd = vars[V_dcm_gain] * (1.0 + 0.5 * lock), wanted = r.cop + (1.0 + kd / w) * (m.xi - r.dcm);
-    double usable = vars[V_sole_usable] + lock * (vars[V_sole_half_width] - 0.003 - vars[V_sole_usable]);
+    double kd = vars[V_dcm_gain] * (1.0 + vars[V_lock_gain] * lock), wanted = r.cop + (1.0 + kd / w) * (m.xi - r.dcm);
+    double usable = vars[V_sole_usable] + lock * (vars[V_lock_sole] - vars[V_sole_usable]);
     double low = (right ? -a : a) - usable, high = (left ? a : -a) + usable;
     self->cop_command = CLIP(wanted, low, high);
     double torque = -vars[V_hip_gain] * WEIGHT * (wanted - self->cop_command);
     torque -= vars[V_posture_stiffness] * m.roll + vars[V_posture_damping] * (1.0 + 0.5 * compliance) * m.rate;
-    double limit = vars[V_hip_torque] * (1.0 + 0.6 * lock);
+    double limit = vars[V_hip_torque] * (1.0 + vars[V_lock_torque] * lock);
     self->torque_command = CLIP(torque, -limit, limit);
 }

@@ -14,11 +14,11 @@
 #define LINE_MASS (LEGS_MASS * LEGS_CENTRE + UPPER_MASS)
 #define SHORTEST 0.45 /* of the first length: knees at their limit */
 
-/* Beyond the edge by more than hip torque over weight, and outward: gravity wins over all that the hips can do. */
+/* Beyond the outer edge of both feet by more than hip torque over weight, and outward: gravity wins over all that the hips can
+ * do. Inwards there is no fall: the swing foot comes down. */
 int fall_begins(const Plant *self, const double *vars) {
     const double *x = self->x, y = com_of(x), v = com_rate_of(x);
-    const double low = (self->right_down ? x[X_YR] : x[X_YL]) - vars[V_sole_half_width];
-    const double high = (self->left_down ? x[X_YL] : x[X_YR]) + vars[V_sole_half_width];
+    const double low = x[X_YR] - vars[V_sole_half_width], high = x[X_YL] + vars[V_sole_half_width];
     const double lost = vars[V_hip_torque] / WEIGHT, width = x[X_YL] - x[X_YR];
     return (y > high + lost && v > 0.0) || (y < low - lost && v < 0.0) || width > vars[V_split_max] || width < vars[V_split_min];
 }
@@ -29,10 +29,8 @@ static double half_breadth(const Plant *self, const double *vars) {
 
 void fall_start(Plant *self, const double *vars, double t) {
     const double *x = self->x;
-    const int left = self->left_down, right = self->right_down;
-    double middle = left && right ? 0.5 * (x[X_YL] + x[X_YR]) : left ? x[X_YL] : x[X_YR], y = com_of(x), v = com_rate_of(x);
-    const double side = y >= middle ? 1.0 : -1.0;
-    const double outer = side > 0.0 ? (left ? x[X_YL] : x[X_YR]) : (right ? x[X_YR] : x[X_YL]);
+    const double middle = 0.5 * (x[X_YL] + x[X_YR]), y = com_of(x), v = com_rate_of(x), side = y >= middle ? 1.0 : -1.0;
+    const double outer = side > 0.0 ? x[X_YL] : x[X_YR];
     const double edge = outer + side * vars[V_sole_half_width];
     double c[C_SIZE] = {y, x[X_ROLL], x[X_YL], x[X_YR], 0.0, 0.0, x[X_AL], x[X_AR]}, rate, acceleration;
     c[C_LIFT_LEFT] = lift_height(&self->lift[0], t, &rate, &acceleration);
@@ -51,7 +49,7 @@ void fall_start(Plant *self, const double *vars, double t) {
     f[T_HUMAN_RATE] = 0.0;
     self->fall_edge = edge, self->fall_side = side, self->fall_start = alpha, self->fall_length = length;
     self->stage = STAGE_TIPPING;
-    self->left_down = side > 0.0 && left ? 1 : side > 0.0 ? 0 : !right;
+    self->left_down = side > 0.0;
     self->right_down = !self->left_down;
 }
 
