@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
+from types import NoneType
 
 import msgspec
 
@@ -263,10 +264,9 @@ def _plain(i: Indication, kind: str) -> Indication:
     for ref in i.evidence:
         if type(ref) is not SampleRef or type(ref.channel) is not str or type(ref.stamp_ns) is not int:
             raise TypeError(f"{i.kind}: evidence {ref!r} is not a SampleRef")
-    numbers = (i.statistic, i.threshold, i.severity, *i.measures.values())
     tte = i.time_to_event_s
-    builtin = all(type(x) is float or type(x) is int for x in numbers) and (tte is None or type(tte) is float)
-    if builtin and i.kind == kind and not i.measures and type(i.evidence) is tuple:
+    types = {type(i.statistic), type(i.threshold), type(i.severity), *map(type, i.measures.values())}
+    if types == {float} and i.kind == kind and type(tte) in (float, NoneType) and type(i.evidence) is tuple:
         return i
     return msgspec.structs.replace(
         i,

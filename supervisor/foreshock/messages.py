@@ -7,7 +7,8 @@ y left, z up) and REP 105. Quaternions are x, y, z, w.
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -169,17 +170,40 @@ AnyMessage: TypeAlias = (
 )
 
 
-def is_finite(value: object) -> bool:
-    """Whether every number in a message is finite; ints, strings, None and booleans always are."""
-    if isinstance(value, float):
-        return math.isfinite(value)
-    if isinstance(value, tuple):
-        try:
-            return (
-                math.isfinite(math.fsum(value)) if value and isinstance(value[0], float) else all(map(is_finite, value))
-            )
-        except (OverflowError, ValueError, TypeError):
-            return False
-    if isinstance(value, msgspec.Struct):
-        return all(is_finite(getattr(value, f)) for f in value.__struct_fields__)
-    return True
+def _vectors(*vectors: tuple[float, ...] | None) -> float:
+    return sum([sum(v) for v in vectors if v])
+
+
+_TOTAL: Mapping[type, Callable[[Any], float]] = {
+    Scalar: lambda m: m.data,
+    JointState: lambda m: sum(m.position) + sum(m.velocity) + sum(m.effort),
+    Imu: lambda m: _vectors(m.orientation, m.angular_velocity, m.linear_acceleration),
+    WrenchStamped: lambda m: sum(m.force) + sum(m.torque),
+    Odometry: lambda m: _vectors(m.position, m.orientation, m.linear, m.angular),
+    Detections: lambda m: sum([d.confidence + sum(d.center) + sum(d.size) for d in m.detections]),
+    Humans: lambda m: sum(
+        [
+            h.uncertainty + sum(h.velocity or ()) + sum([sum(c.a) + sum(c.b) + c.radius for c in h.capsules])
+            for h in m.humans
+        ]
+    ),
+    GripState: lambda m: (
+        m.normal_force
+        + m.tangential_force
+        + m.opening
+        + m.commanded_force
+        + m.object_mass
+        + m.vertical_acceleration
+    ),
+    Heartbeat: lambda m: m.round_trip_s,
+    MotionPlan: lambda m: sum(m.com) + m.speed,
+}
+"""Sum of all numbers of a message: finite only if every one is (or it overflows, which no physical quantity does)."""
+
+
+def is_finite(message: Message) -> bool:
+    """Whether every number in a message is a finite number."""
+    try:
+        return math.isfinite(_TOTAL[type(message)](message))
+    except (TypeError, ValueError, KeyError):
+        return False

@@ -144,6 +144,8 @@ def level_step(state: LevelState, gates: Gates, trust: float, overdue: bool, now
 
     Monotone over open-loop histories: pointwise lower trust never gives a lower level.
     """
+    if state.level is ProtectionLevel.NORMAL and trust >= gates.caution and not overdue:
+        return state
     levels = (ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE, ProtectionLevel.MINIMAL_RISK)
     edges = (gates.caution, gates.protective, 0.0)
     dwell_ns = round(gates.dwell_s * 1e9)

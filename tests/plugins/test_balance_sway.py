@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -32,7 +33,7 @@ def test_an_excursion_that_does_not_come_back_has_the_amplitude_of_what_came_bac
     corners = [(0.0, 0.0), (0.2, -0.01), (0.6, 0.08), (0.8, 0.07), (1.2, 0.17), (2.0, 0.17)]
 
     def path(t):
-        for (a, x), (b, y) in zip(corners, corners[1:], strict=False):
+        for (a, x), (b, y) in itertools.pairwise(corners):
             if t <= b:
                 return x + (y - x) * (t - a) / (b - a)
         return corners[-1][1]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from foreshock_detectors import grip
 from test_grip import SPEC, G, Scene, ramp, step
 
 from foreshock.records import Sample
 from foreshock.testing import DetectorConformance
+from foreshock_detectors import grip
 
 
 class TestGripConformance(DetectorConformance):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from foreshock_detectors import telemetry
 from test_telemetry import SPEC, message
 
 from foreshock.records import Sample
 from foreshock.testing import DetectorConformance
+from foreshock_detectors import telemetry
 
 
 class TestTelemetryConformance(DetectorConformance):

@@ -116,15 +116,15 @@ PERTURBATIONS = {
 }
 """One at a time, as in the paper's discussion: a and c by 20%, b by 1."""
 
-# What Eq. 1 gives at m = q = 1, 2, 3, worked out in rational arithmetic (eq_1), to four places.
+# Eq. 1 at m = q = 1, 2, 3 to four places, worked out by awk and in rational arithmetic (eq_1).
 PERTURBED = {
     "paper": (0.1174, 0.4546, 0.8093),
     "a-20%": (0.1520, 0.4546, 0.7611),
-    "a+20%": (0.0894, 0.4546, 0.8486),
-    "b-1": (0.3494, 0.7564, 0.9344),
+    "a+20%": (0.0894, 0.4546, 0.8483),
+    "b-1": (0.3494, 0.7565, 0.9346),
     "b+1": (0.0274, 0.1527, 0.4863),
     "c-20%": (0.1037, 0.4267, 0.7853),
-    "c+20%": (0.1281, 0.4719, 0.8210),
+    "c+20%": (0.1282, 0.4719, 0.8210),
 }
 LOW, HIGH = 0.3, 0.7
 """P of an isolated precursor that still counts as low; P beyond which T < 0.3 and the paper's protocols engage."""

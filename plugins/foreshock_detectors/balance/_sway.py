@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections import deque
 
@@ -19,7 +20,7 @@ class Swing:
     is a slow shift. A turning point is a reversal by more than `reversal`, which keeps noise from making any.
 
     Args:
-        window_s: how long an oscillation stays in view after its turning point.
+        window_s: how long an oscillation stays in view after its end, and how long a half swing may take.
         reversal: smallest reversal that counts, in the unit of the signal.
     """
 
@@ -30,27 +31,29 @@ class Swing:
 
     def reset(self) -> None:
         """Forget everything."""
-        self._extreme_ns = -1
-        self._extreme = self._turn = self._half = 0.0
-        self._turn_ns = 0
         self._rising: bool | None = None
+        self._low, self._high = math.inf, -math.inf
+        self._extreme = self._turn = self._half = 0.0
+        self._extreme_ns = self._turn_ns = 0
         self._oscillations: deque[tuple[int, float]] = deque()
 
     def update(self, stamp_ns: int, value: float) -> float:
         """Take one value and give the amplitude now, in the same unit; 0 where nothing came back."""
-        if self._extreme_ns < 0:
-            self._turn = self._extreme = value
-            self._turn_ns = self._extreme_ns = stamp_ns
-        elif self._rising is None:
-            # the first half swing has no beginning: it only sets the direction
-            if abs(value - self._turn) > self._reversal:
-                self._rising = value > self._turn
-                self._extreme, self._extreme_ns = value, stamp_ns
+        if self._rising is None:
+            self._begin(stamp_ns, value)
         elif (value > self._extreme) if self._rising else (value < self._extreme):
             self._extreme, self._extreme_ns = value, stamp_ns
         elif abs(value - self._extreme) > self._reversal:
             self._reverse(value, stamp_ns)
         return self._amplitude(stamp_ns)
+
+    def _begin(self, stamp_ns: int, value: float) -> None:
+        """The first half swing has no beginning: it sets the direction, and is too long for any window."""
+        self._low, self._high = min(self._low, value), max(self._high, value)
+        if self._high - self._low > self._reversal:
+            self._rising = value == self._high
+            self._extreme, self._extreme_ns = value, stamp_ns
+            self._turn, self._turn_ns = value, stamp_ns - self._window_ns - 1
 
     def _reverse(self, value: float, stamp_ns: int) -> None:
         # the half swing that ends here and the one before it make an oscillation about the turning point between them

@@ -24,7 +24,8 @@ class GripConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         transfer_rate_noise: the same while load is being handed over or picked up: a 2 kg object in 0.4 s is 50 N/s.
         grip_rate_noise: the same of the normal force at a constant command.
         command_rate_noise: the same of the normal force while the command moves.
-        false_alarm_s: mean time between false alarms of each sequential test (s); 10 h is about one working shift.
+        false_alarm_s: least mean time between false alarms of each sequential test (s); 10 h is about one working
+            shift. A load that stands stiller than load_rate_noise allows makes them two to three times rarer still.
         smallest_step_sigma: step in standard deviations that CUSUM is tuned to find soonest; its reference is half.
         slip_hold_s: a slip stays present for so long after its last alarm (s): the period of a 5 Hz stick-slip.
         friction: friction coefficient of the pads; for the measure ``friction_use`` alone, never judged.

@@ -1,7 +1,7 @@
 """Proximity precursors: a human inside the protective separation distance, and clearance that narrows.
 
-Capsules around the robot's collision meshes by Pinocchio, distances by python-fcl, S_p by ISO/TS 15066. Any URDF; TALOS by
-default.
+Capsules around the robot's collision meshes by Pinocchio, distances by python-fcl, S_p by ISO/TS 15066. Any URDF; TALOS
+by default.
 """
 
 from __future__ import annotations

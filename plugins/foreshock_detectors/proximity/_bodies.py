@@ -1,8 +1,9 @@
 """Capsules around the collision shapes of a robot: one per moving joint, then the cheapest neighbours merged.
 
 Merging joint c into its parent replaces c's points by all places that they take over c's range, seen from the parent. A
-turning point of radius p about the joint's axis is replaced by the corners of a circumscribed polyline, p / cos(step / 2) at
-sampled angles, and its two end positions: their hull encloses the whole arc, so that the merged capsule still bounds.
+turning point of radius p about the joint's axis is replaced by the corners of a circumscribed polyline, p / cos(step /
+2) at sampled angles, and its two end positions: their hull encloses the whole arc, so that the merged capsule still
+bounds.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ class Swept(msgspec.Struct, frozen=True):
         joint: its name.
         lower: least position that the merged capsule covers (rad or m); None is unlimited.
         upper: greatest position.
-        reach: largest distance of its points from its axis (m), so that one radian beyond the range moves them at most so
-            far; 1 for a sliding joint.
+        reach: largest distance of its points from its axis (m), so that one radian beyond the range moves them at most
+            so far; 1 for a sliding joint.
     """
 
     joint: str
@@ -120,7 +121,7 @@ def _fitted(joint: str, points: Points, swept: tuple[Swept, ...]) -> BodyCapsule
 
 
 def _offer(model: Any, points: dict[int, Points], child: int) -> _Offer | None:
-    """Merging child into the nearest joint above it that has points; None if there is none or a joint cannot be swept."""
+    """Merging child into the nearest joint above it that has points; None if that cannot be."""
     joint, moved, swept = child, points[child], []
     while joint > 0 and (joint == child or joint not in points):
         if model.joints[joint].nv != 1:
@@ -144,8 +145,8 @@ def _sweep(model: Any, child: int, points: Points) -> tuple[Points, float]:
     sliding = bool(np.abs(motion[3:]).max() == 0.0)
     if sliding:
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            place = f"joint {model.names[child]!r} slides without limits"
-            raise ConfigError("proximity.capsules", f"{place} and cannot be merged", "; expected 0, or limits in the URDF")
+            problem = f"joint {model.names[child]!r} slides without limits and cannot be merged"
+            raise ConfigError("proximity.capsules", problem, "; expected 0, or limits in the URDF")
         return np.vstack([_placed(model, data, q, child, x, points) for x in (lower, upper)]), 1.0
     u = motion[3:] / math.sqrt(float(motion[3:] @ motion[3:]))
     across = points - np.outer(points @ u, u)

@@ -1,13 +1,15 @@
 """All joint placements and velocities of Pinocchio's data as two arrays, without a Python object per joint.
 
-Reading 34 placements through the bindings costs 35 us, these views cost nothing. Pinocchio hands out ``oMi[i]`` and ``v[i]`` as
-live views into two std::vector, whose elements lie one behind the other and stay where they are for the life of the data.
-The layout is not promised in Python, so it is checked on the addresses and on the values of every joint before it is used.
+Reading 34 placements through the bindings costs 35 us, these views cost nothing. Pinocchio hands out ``oMi[i]`` and
+``v[i]`` as live views into two std::vector, whose elements lie one behind the other and stay where they are for the
+life of the data. The layout is not promised in Python, so it is checked on the addresses and on the values of every
+joint before it is used.
 """
 
 from __future__ import annotations
 
 import ctypes
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -58,7 +60,7 @@ def _view(firsts: list[Any], doubles: int) -> NDArray[np.float64]:
     """One row of doubles per element, given views on the beginning of each."""
     addresses = [int(f.__array_interface__["data"][0]) for f in firsts]
     step = doubles * ctypes.sizeof(ctypes.c_double)
-    if any(b - a != step for a, b in zip(addresses, addresses[1:], strict=False)):
+    if any(b - a != step for a, b in pairwise(addresses)):
         raise RuntimeError(f"Pinocchio {pin.__version__} does not store joint data one behind the other")
     memory = (ctypes.c_double * (doubles * len(firsts))).from_address(addresses[0])
     return np.ctypeslib.as_array(memory).reshape(len(firsts), doubles)

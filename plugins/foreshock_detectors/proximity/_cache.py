@@ -1,4 +1,4 @@
-"""Capsules on disk, by what they were computed from. A file that is torn, altered or old is fitted anew, never trusted."""
+"""Capsules on disk, by what they were computed from. A file that is torn or altered is fitted anew, never trusted."""
 
 from __future__ import annotations
 

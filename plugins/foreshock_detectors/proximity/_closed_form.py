@@ -1,7 +1,8 @@
 """The independent check of one distance: which feature of each segment is closest is tried out, not solved for.
 
-The closest points of two segments are an end of one and its foot on the other, or the feet of the common perpendicular of the
-lines where both lie within; the least of the five candidates is the distance. Scalar, and shares nothing with the others.
+The closest points of two segments are an end of one and its foot on the other, or the feet of the common perpendicular
+of the lines where both lie within; the least of the five candidates is the distance. Scalar, and shares nothing with
+the others.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How fast a person comes nearer: slope of the distance over a short window, one value per measurement of his position."""
+"""How fast a person comes nearer: slope of the distance over a short window, one value per measurement of him."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ _LEAST_SHARE = 0.35
 class ClosingSpeed:
     """Least-squares slope of distance over time, negated.
 
-    With n samples of noise sigma, evenly over a window T, its standard deviation is sqrt(12 / n) sigma / T: at 20 Hz, 0.4 s and
-    20 mm that is 0.06 m/s. Taking one sample per measurement keeps the steps of a 20 Hz tracker out of a 1 kHz derivative.
+    With n samples of noise sigma, evenly over a window T, its standard deviation is sqrt(12 / n) sigma / T: at 20 Hz,
+    0.4 s and 20 mm that is 0.06 m/s. Taking one sample per measurement keeps the steps of a 20 Hz tracker out of a 1
+    kHz derivative.
 
     Args:
         window_s: T.

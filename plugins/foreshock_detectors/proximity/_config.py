@@ -42,8 +42,8 @@ class ProximityConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         fall_support_m: capsules whose lowest point is within this of the ground count as support: a foot in swing too.
         hysteresis_m: human-proximity-breach is withdrawn beyond S_p plus this: twice the noise of a tracked position.
         severe_closing_m_s: closing speed of severity 1: ISO 13855's 2.0 m/s.
-        closing_m_s: threshold of narrowing-clearance. Over closing_window_s at 20 Hz a noise of 20 mm a sample is 0.06 m/s
-            of slope, so that it is four standard deviations; a slow walk is 0.5 m/s or more.
+        closing_m_s: threshold of narrowing-clearance. Over closing_window_s at 20 Hz a noise of 20 mm a sample is 0.06
+            m/s of slope, so that it is four standard deviations; a slow walk is 0.5 m/s or more.
         closing_release_ratio: withdrawn below this share of closing_m_s.
         closing_window_s: window of the least-squares slope.
         horizon_s: narrowing counts when S_p will be reached within this time: twice T_r + T_s and some.

@@ -3,114 +3,132 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from foreshock.clock import NS_PER_S
 from foreshock.detector import Inputs
 from foreshock.records import Indication, Sample, SampleRef
-from foreshock_detectors.proximity._closing import ClosingSpeed
+from foreshock_detectors.proximity._approach import Approach
 from foreshock_detectors.proximity._config import ProximityConfig
-from foreshock_detectors.proximity._fall import Topple
 from foreshock_detectors.proximity._kinematics import CapsuleKinematics
-from foreshock_detectors.proximity._pair import PlacedCapsule, checked_distance_m
-from foreshock_detectors.proximity._people import Crowd, People, Person
+from foreshock_detectors.proximity._nearest import NearestPairs
+from foreshock_detectors.proximity._people import People
 from foreshock_detectors.proximity._robot import Robot
-from foreshock_detectors.proximity._segments import Array, PairDistances
-from foreshock_detectors.proximity._separation import ProtectiveSeparation, protective_separation
+from foreshock_detectors.proximity._separation import protective_separation
 
 __all__ = ["ProximityDetector"]
 
 BREACH, NARROWING = "human-proximity-breach", "narrowing-clearance"
 
-_HORIZON_RELEASE = 1.25
-"""narrowing-clearance is withdrawn only when S_p is farther off than this many horizons."""
-
-
-class _Nearest(NamedTuple):
-    """The pair of capsules that is judged for one human, and the distance of the closest pair (m)."""
-
-    distance_m: float
-    robot_speed_m_s: float
-    separation: ProtectiveSeparation
-    closest_m: float
-
-
-class _Subject:
-    """What is remembered of one human: verdicts and how fast he comes nearer."""
-
-    def __init__(self, config: ProximityConfig) -> None:
-        self.closing = ClosingSpeed(config.closing_window_s)
-        self.measured_ns = -1
-        self.breach = False
-        self.narrowing = False
-
 
 class ProximityDetector:
     """Reports human-proximity-breach and narrowing-clearance for every human, or for ``""`` while nobody is there.
 
-    Every update moves the robot's capsules by its joint state and the human ones by their measured velocity, takes the distances
-    of all pairs, and reports the pair with the least d - S_p (the closest one, unless a faster part is nearer in time), by
-    python-fcl and checked. Malformed input raises ValueError or ConfigError.
+    Every update moves the robot's capsules by its joint state and the human ones by their measured velocity, takes the
+    distances of all pairs, and reports the pair with the least d - S_p (the closest one, unless a faster part is nearer
+    in time), by python-fcl and checked. Malformed input raises ValueError or ConfigError. A human who has left a live
+    stream is reported absent for a while.
 
-    The closing speed of a human who has just been found is not known. narrowing-clearance is then left out of the answer
-    where it is not present, unless even the fastest approach could not reach S_p within the horizon.
+    The closing speed of a human who has just been found is not known. Unless even the fastest approach could not reach
+    S_p within the horizon, narrowing-clearance is then left out of the answer, hence unobserved; for the others too
+    where it is absent, since absence would speak for all.
     """
 
     def __init__(self, config: ProximityConfig) -> None:
         self._config = config
         self._robot = Robot(config)
-        self._brake_s = config.reaction_s + config.stopping_speed_ratio * config.stopping_s
         self.reset(0)
 
     def reset(self, seed: int) -> None:  # noqa: ARG002  # part of the port; nothing here is random
         """Forget everything."""
         self._body = CapsuleKinematics(self._robot)
+        self._body_ns = (-1, -1)
         self._people = People(self._config)
-        self._pairs: PairDistances | None = None
-        self._subjects: dict[str, _Subject] = {}
-        self._robot_ns = (-1, -1)
-        self._topple: Topple | None = None
+        self._nearest = NearestPairs(self._config)
+        self._approaches: dict[str, Approach] = {}
 
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:
-        """Two indications per human; none at all if an input is missing."""
+        """Two indications per human, by id; none at all if an input is missing."""
         latest = inputs.latest
         joints, odometry, humans = latest.get("joints"), latest.get("odometry"), latest.get("humans")
         if joints is None or odometry is None or humans is None:
             return []
-        self._move_robot(joints, odometry, humans)
-        self._people.take(humans.stamp_ns, _value(humans))
-        evidence = tuple([SampleRef(s.channel, s.stamp_ns) for s in (joints, odometry, humans)])
+        self._move_body(joints, odometry, humans)
+        people = self._people
+        people.take(humans.stamp_ns, _value(humans))
         stamp_ns = max(joints.stamp_ns, odometry.stamp_ns, humans.stamp_ns)
-        crowd = self._people.crowd
-        answer: list[Indication] = []
-        absent = self._people.left(now_ns)
-        if crowd is None:
-            self._subjects.clear()
-            absent.insert(0, "")
-        else:
-            answer = self._judge(crowd, now_ns, stamp_ns, evidence)
-        narrowing_known = crowd is None or any(i.kind == NARROWING and not i.present for i in answer)
-        for subject in absent:
-            if crowd is not None and subject in self._subjects:
-                continue
-            answer.append(self._absent(BREACH, subject, stamp_ns, evidence))
-            if narrowing_known:
-                answer.append(self._absent(NARROWING, subject, stamp_ns, evidence))
-        return answer
+        evidence = tuple([SampleRef(s.channel, s.stamp_ns) for s in (joints, odometry, humans)])
+        breaches, narrowings, unknown = self._judge(now_ns, stamp_ns, evidence)
+        left = people.left(now_ns)
+        if people.crowd is None and "" not in left:
+            left.insert(0, "")
+        for subject in left:
+            breaches.append(self._no_breach(subject, stamp_ns, evidence))
+            narrowings.append(self._no_narrowing(subject, stamp_ns, evidence))
+        if unknown:
+            narrowings = [i for i in narrowings if i.present]
+        return breaches + narrowings
 
-    def _move_robot(self, joints: Sample, odometry: Sample, humans: Sample) -> None:
+    def _move_body(self, joints: Sample, odometry: Sample, humans: Sample) -> None:
         pose, people = _value(odometry), _value(humans)
         if people.frame_id != pose.frame_id:
             problem = f"humans/pose is in frame {people.frame_id!r}, base/odometry in {pose.frame_id!r}"
             raise ValueError(f"{problem}; expected the same")
         stamps = (joints.stamp_ns, odometry.stamp_ns)
-        if stamps == self._robot_ns or joints.stamp_ns < self._robot_ns[0]:
-            return
-        self._body.evaluate(_value(joints), pose, joints.stamp_ns - odometry.stamp_ns)
-        self._robot_ns = stamps
-        self._topple = None
-        if self._config.fall_reach:
-            body = self._body
-            self._topple = Topple(body.start, body.along, body.radius, self._config.fall_support_m)
+        if stamps != self._body_ns and joints.stamp_ns >= self._body_ns[0]:
+            self._body.evaluate(_value(joints), pose, joints.stamp_ns - odometry.stamp_ns)
+            self._body_ns = stamps
+
+    def _judge(
+        self, now_ns: int, stamp_ns: int, evidence: tuple[SampleRef, ...]
+    ) -> tuple[list[Indication], list[Indication], bool]:
+        """Breaches and narrowings of those who are there, and whether anyone's narrowing is not known."""
+        people, approaches = self._people, self._approaches
+        crowd = people.crowd
+        if crowd is None:
+            approaches.clear()
+            return [], [], False
+        if len(approaches) > len(crowd.people):
+            there = {p.id for p in crowd.people}
+            for name in [a for a in approaches if a not in there]:
+                del approaches[name]
+        age_s = (now_ns - self._body_ns[0]) / NS_PER_S
+        found = self._nearest.evaluate(self._body, age_s, people, crowd, now_ns)
+        breaches, narrowings, unknown = [], [], False
+        for person, nearest in zip(crowd.people, found, strict=True):
+            approach = approaches.get(person.id)
+            if approach is None:
+                approach = approaches[person.id] = Approach(self._config)
+            at_ns = person.stamp_ns + people.ages_ns(person, now_ns)[0]
+            approach.take(person.stamp_ns, at_ns, nearest, person.speed_m_s)
+            breaches.append(approach.breach(BREACH, person.id, stamp_ns, evidence))
+            narrowing = approach.narrowing(NARROWING, person.id, stamp_ns, evidence)
+            if narrowing is None:
+                unknown = True
+            else:
+                narrowings.append(narrowing)
+        return breaches, narrowings, unknown
+
+    def _no_breach(self, subject: str, stamp_ns: int, evidence: tuple[SampleRef, ...]) -> Indication:
+        """Nobody within the sensor's range: what S_p would be at its end, with a robot that does not approach."""
+        separation = protective_separation(
+            self._config,
+            distance_m=self._config.sensor_range_m,
+            human_speed_m_s=None,
+            human_age_s=0.0,
+            robot_speed_m_s=0.0,
+            robot_age_s=0.0,
+            uncertainty_m=0.0,
+            fall_clearance_m=None,
+        )
+        distance_m, s_p_m = self._config.sensor_range_m, separation.s_p_m
+        return Indication(BREACH, subject, stamp_ns, False, distance_m, s_p_m, "m", 0.0, evidence)
+
+    def _no_narrowing(self, subject: str, stamp_ns: int, evidence: tuple[SampleRef, ...]) -> Indication:
+        closing_m_s = self._config.closing_m_s
+        return Indication(NARROWING, subject, stamp_ns, False, 0.0, closing_m_s, "m/s", 0.0, evidence)
+
+
+def _value(sample: Sample) -> Any:
+    """The message; its type is what the spec declares for the input, which the core checks."""
+    return sample.value

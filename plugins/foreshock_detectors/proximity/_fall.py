@@ -1,17 +1,18 @@
 """How near to a human a toppling robot can come.
 
-A biped falls as a rigid body about the edge of its support that is nearest to the human, in the posture of this instant. With
-u the horizontal direction to the human, e = max u.p + r over the supporting capsules (the edge), and x = u.p - e, h the height
-above the ground of a capsule's end p of radius r, the fall reaches as far as
+A biped falls as a rigid body about the edge of its support that is nearest to the human, in the posture of this
+instant. With u the horizontal direction to the human, e = max u.p + r over the supporting capsules (the edge), and x =
+u.p - e, h the height above the ground of a capsule's end p of radius r, the fall reaches as far as
 
     rho = max (sqrt(x^2 + h^2) + r)      over all capsule ends
 
-beyond the edge: each end moves on a circle about it, and a capsule lies within the hull of its end balls. The nearest part of
-the human along u is X = min (u.p - r) - e over his capsules. The fall clearance is X - rho, and S_f = d - (X - rho).
+beyond the edge: each end moves on a circle about it, and a capsule lies within the hull of its end balls. The nearest
+part of the human along u is X = min (u.p - r) - e over his capsules. The fall clearance is X - rho, and S_f = d - (X -
+rho).
 
-For people and robots that stand upright d is the horizontal gap X - max(x + r), so that S_f = rho - max(x + r): the robot's
-reach lying down minus its reach now. Where the closest points are not level, d is longer than the horizontal gap, and S_f
-grows by the difference. Arms thrown out while falling are not in it.
+For people and robots that stand upright d is the horizontal gap X - max(x + r), so that S_f = rho - max(x + r): the
+robot's reach lying down minus its reach now. Where the closest points are not level, d is longer than the horizontal
+gap, and S_f grows by the difference. Arms thrown out while falling are not in it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ import math
 
 import numpy as np
 
-from foreshock.messages import Vec3
 from foreshock_detectors.proximity._segments import Array
 
 __all__ = ["Topple"]
@@ -62,18 +62,20 @@ class Topple:
         x += self._radius
         return float(x.max())
 
-    def clearance_m(self, centre: Vec3, ends: Array, radius: Array) -> float:
-        """X - rho in m; negative where the fall can hit.
+    def clearance_m(self, start: Array, along: Array, radius: Array) -> float:
+        """X - rho in m for one human; negative where the fall can hit.
 
         Args:
-            centre: of the human (m), from the robot's base.
-            ends: both ends of his k capsules, shape (2, k, 3), m, from the robot's base.
+            start: one end of each of his capsules, shape (k, 3), m, in the frame of the robot's.
+            along: from there to the other end, shape (k, 3), m.
             radius: shape (k,), m.
         """
-        away = math.hypot(centre[0], centre[1])
-        if away < 1e-6:  # he stands where the robot is: every direction hits
-            return -self.reach_m(np.array((1.0, 0.0)), 0.0)
-        u = np.array((centre[0] / away, centre[1] / away))
+        near, far = start[:, :2], start[:, :2] + along[:, :2]
+        x, y = (near.sum(axis=0) + far.sum(axis=0)).tolist()
+        away = math.hypot(x, y)
+        if away < 1e-6:  # he stands where the robot's base is: any direction will do
+            x, y, away = 1.0, 0.0, 1.0
+        u = np.array((x / away, y / away))
         edge_m = self.edge_m(u)
-        nearest_m = float(((ends[..., :2] @ u).min(axis=0) - radius).min())
+        nearest_m = float((np.minimum(near @ u, far @ u) - radius).min())
         return nearest_m - edge_m - self.reach_m(u, edge_m)

@@ -1,8 +1,9 @@
 """The smallest capsule found around a set of points.
 
 For an axis through c along the unit vector u, let t = (x - c).u and p the distance of the vertex x from the axis. With
-r = max p every vertex is inside when the segment reaches from min(t + s) to max(t - s), s = sqrt(r^2 - p^2). The axis is
-searched from the principal directions of the hull's vertices by Nelder and Mead (1965) over two shifts and two tilts.
+r = max p every vertex is inside when the segment reaches from min(t + s) to max(t - s), s = sqrt(r^2 - p^2). The axis
+is searched from the principal directions of the hull's vertices by Nelder and Mead (1965) over two shifts and two
+tilts.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class FittedCapsule(msgspec.Struct, frozen=True):
 
     @property
     def volume_m3(self) -> float:
-        """pi r^2 l + 4/3 pi r^3."""
+        """Volume: pi r^2 l + 4/3 pi r^3."""
         return _volume(math.dist(self.a, self.b), self.radius)
 
 
@@ -108,7 +109,7 @@ def _extent(hull: Points, c: Points, u: Points) -> tuple[float, float, float]:
 def _principal(hull: Points) -> tuple[Points, Points]:
     """Centre and direction of the best axis along a principal direction, centred on the mid-range across it."""
     mean = hull.mean(axis=0)
-    candidates = []
+    candidates: list[tuple[float, int, Points, Points]] = []
     for u in np.linalg.svd(hull - mean, full_matrices=True)[2]:
         side = _across(u)
         shift = (hull - mean) @ side.T

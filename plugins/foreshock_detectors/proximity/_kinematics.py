@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -103,7 +103,7 @@ class CapsuleKinematics:
         rates = np.matmul(self._twist, arrays.velocities.take(self._joint, 0)[:, :, None])
         np.matmul(rates.reshape(-1, 2, 3), places[:, :3], self._rates)
         if self._reach is not None:
-            self._widen(q, v)
+            self._widen(self._reach, q, v)
 
     def _index(self, names: tuple[str, ...]) -> None:
         joints = self._robot.stream(names)
@@ -130,13 +130,13 @@ class CapsuleKinematics:
         self._lower = np.array([-math.inf if s.lower is None else s.lower for _, s in pairs])
         self._upper = np.array([math.inf if s.upper is None else s.upper for _, s in pairs])
 
-    def _widen(self, q: Array, v: Array) -> None:
+    def _widen(self, reach: Array, q: Array, v: Array) -> None:
         """A point at distance p of an axis moves at most p times the excess angle, with p times the joint's speed."""
         at = q.take(self._swept_q)
-        np.matmul(self._reach, np.abs(v.take(self._swept_v)), self.speed)
+        np.matmul(reach, np.abs(v.take(self._swept_v)), self.speed)
         beyond = np.maximum(at - self._upper, self._lower - at)
         if beyond.max() > 0.0:
-            self.radius = self._fitted + self._reach @ np.maximum(beyond, 0.0)
+            self.radius = self._fitted + reach @ np.maximum(beyond, 0.0)
         elif self.radius is not self._fitted:
             self.radius = self._fitted
 

@@ -44,7 +44,7 @@ def checked_distance_m(robot: PlacedCapsule, human: PlacedCapsule, tolerance_m: 
 
 
 def _object(capsule: PlacedCapsule) -> Any:
-    """fcl's capsule lies along its z axis, centred: turn z to the segment, either way round."""
+    """The capsule for fcl, where it lies along z and is centred: z is turned to the segment, either way round."""
     (ax, ay, az), (bx, by, bz), radius = capsule
     dx, dy, dz = bx - ax, by - ay, bz - az
     length = math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from foreshock.clock import NS_PER_S, ns
 from foreshock.messages import HumanPose, Humans, Vec3
@@ -25,7 +26,6 @@ class Person(msgspec.Struct, frozen=True):
         start: one end of each of his k capsules, shape (k, 3), m, in odom.
         along: from there to the other end, shape (k, 3), m.
         radius: shape (k,), m.
-        centre: mean of the ends (m).
         velocity: of his trunk (m/s), None if it is not measured.
         speed_m_s: its magnitude.
         uncertainty_m: Z_d as stated.
@@ -36,7 +36,6 @@ class Person(msgspec.Struct, frozen=True):
     start: Array
     along: Array
     radius: Array
-    centre: Vec3
     velocity: Vec3 | None
     speed_m_s: float | None
     uncertainty_m: float
@@ -56,7 +55,7 @@ class Crowd(msgspec.Struct, frozen=True):
 
     people: tuple[Person, ...]
     first: tuple[int, ...]
-    owner: Array
+    owner: NDArray[np.intp]
     start: Array
     along: Array
     radius: Array
@@ -141,10 +140,9 @@ def _person(pose: HumanPose, stamp_ns: int) -> Person:
     if not 0.0 <= pose.uncertainty < math.inf:
         raise ValueError(f"{place}: uncertainty {pose.uncertainty} is not a length")
     start, end = np.array([c.a for c in pose.capsules]), np.array([c.b for c in pose.capsules])
-    x, y, z = ((start + end).mean(axis=0) * 0.5).tolist()
     speed = None if velocity is None else math.hypot(*velocity)
     radius = np.array([c.radius for c in pose.capsules])
-    return Person(pose.id, stamp_ns, start, end - start, radius, (x, y, z), velocity, speed, pose.uncertainty)
+    return Person(pose.id, stamp_ns, start, end - start, radius, velocity, speed, pose.uncertainty)
 
 
 def _crowd(known: Mapping[str, Person]) -> Crowd:

@@ -91,7 +91,8 @@ class Robot:
     def _reference(self, config: ProximityConfig, srdf: Path | None) -> Any:
         if srdf is None:
             if config.held_joints:
-                raise ConfigError("proximity.held_joints", "they need a reference configuration", "; set proximity.srdf")
+                problem = "they need a reference configuration"
+                raise ConfigError("proximity.held_joints", problem, "; set proximity.srdf")
             return np.array(pin.neutral(self.model))
         try:
             pin.loadReferenceConfigurations(self.model, os.fspath(srdf), False)

@@ -1,12 +1,14 @@
 """All pairs of n robot and m human capsules at once: how far apart, and how fast the robot's side approaches.
 
-For segments p1 + s d1 and p2 + t d2 with s, t in [0, 1] and r = p1 - p2 (Ericson, Real-Time Collision Detection, 5.1.9):
+For segments p1 + s d1 and p2 + t d2 with s, t in [0, 1] and r = p1 - p2 (Ericson, Real-Time Collision Detection,
+5.1.9):
 
     s = clamp((d1.d2 d2.r - d1.r d2.d2) / (d1.d1 d2.d2 - (d1.d2)^2)),  0 for parallel ones
     t = clamp((s d1.d2 + d2.r) / d2.d2),  then  s = clamp((t d1.d2 - d1.r) / d1.d1)
 
-Taking s anew for the clamped t covers all of Ericson's cases without a branch. Every scalar product comes from one matrix
-product, and every step is one array operation into memory kept for the purpose. Rounding: some 1e-8 m near contact.
+Taking s anew for the clamped t covers all of Ericson's cases without a branch. Every scalar product comes from one
+matrix product, and every step is one array operation into memory kept for the purpose. Rounding: some 1e-8 m near
+contact.
 """
 
 from __future__ import annotations

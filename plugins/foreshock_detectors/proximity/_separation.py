@@ -52,8 +52,8 @@ def protective_separation(
     Args:
         config: T_r, T_s and the constant terms.
         distance_m: present separation d.
-        human_speed_m_s: measured v_h; its whole magnitude, for a person turns within T_r. None if it is not measured: 1.6 m/s
-            beyond 0.5 m of separation, 2.0 m/s nearer.
+        human_speed_m_s: measured v_h; its whole magnitude, for a person turns within T_r. None if it is not measured:
+            1.6 m/s beyond 0.5 m of separation, 2.0 m/s nearer.
         human_age_s: age of the position used for the human, after extrapolation.
         robot_speed_m_s: v_r, of the robot's closest part towards the human; negative counts as 0.
         robot_age_s: age of the robot's state.

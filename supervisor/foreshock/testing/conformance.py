@@ -13,6 +13,7 @@ the real supervisor, so that what is tested is what a robot will get.
 # ruff: noqa: S101 # these are tests; each assert carries its message, since pytest rewrites no asserts here
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -107,7 +108,7 @@ class DetectorConformance:
         given = {(s.channel, s.stamp_ns) for s in self._samples}
         for call in self._play.calls:
             for i in call.said or ():
-                assert is_finite(tuple(i.measures.values())), f"measures of {i.kind} at {call.now_ns} ns: {i.measures}"
+                assert all(map(math.isfinite, i.measures.values())), f"measures of {i.kind} at {call.now_ns} ns: {i.measures}"
                 assert i.evidence or not i.present, f"{i.kind} is present at {call.now_ns} ns without any evidence"
                 for ref in i.evidence:
                     known = (ref.channel, ref.stamp_ns) in given

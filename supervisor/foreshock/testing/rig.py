@@ -84,7 +84,7 @@ class Watched:
         try:
             with self._armed():
                 call.said = self._detector.update(now_ns, inputs)
-        except Exception as e:
+        except BaseException as e:  # what is not an Exception is contained by the core as well
             call.error = f"{type(e).__name__}: {e}"
             raise
         finally:

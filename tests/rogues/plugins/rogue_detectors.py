@@ -73,7 +73,7 @@ class Undeclared(Upright):
 class Prophet(Upright):
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:
         (said,) = super().update(now_ns, inputs)
-        return [msgspec.structs.replace(said, stamp_ns=now_ns + 1)]
+        return [msgspec.structs.replace(said, stamp_ns=now_ns + 1_000_000_000)]
 
 
 class NoEvidence(Upright):

@@ -14,13 +14,14 @@
 #define LINE_MASS (LEGS_MASS * LEGS_CENTRE + UPPER_MASS)
 #define SHORTEST 0.45 /* of the first length: knees at their limit */
 
-/* Beyond the outer edge of both feet by more than hip torque over weight, and outward: gravity wins over all that the hips can
- * do. Inwards there is no fall: the swing foot comes down. */
+/* The CoM beyond the outer edge of both feet, and the capture point by more than hip moment over weight: xi' = w (xi - P - tau
+ * / (m g)) then grows even if the hips gave all they can for ever. (Inwards there is no fall: the swing foot comes down.) */
 int fall_begins(const Plant *self, const double *vars) {
-    const double *x = self->x, y = com_of(x), v = com_rate_of(x);
+    const double *x = self->x, y = com_of(x), xi = y + com_rate_of(x) / dcm_rate(), width = x[X_YL] - x[X_YR];
     const double low = x[X_YR] - vars[V_sole_half_width], high = x[X_YL] + vars[V_sole_half_width];
-    const double lost = vars[V_hip_torque] / WEIGHT, width = x[X_YL] - x[X_YR];
-    return (y > high + lost && v > 0.0) || (y < low - lost && v < 0.0) || width > vars[V_split_max] || width < vars[V_split_min];
+    const double lost = vars[V_hip_torque] * (1.0 + vars[V_lock_torque] * self->act[ACT_LOCK]) / WEIGHT;
+    if (width > vars[V_split_max] || width < vars[V_split_min]) return 1;
+    return (y > high && xi > high + lost) || (y < low && xi < low - lost);
 }
 
 static double half_breadth(const Plant *self, const double *vars) {

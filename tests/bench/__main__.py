@@ -1,0 +1,36 @@
+"""``make bench``: prints the table and writes bench.json."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import msgspec
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from tests.bench import fmu_step, tick
+from tests.bench.rows import Row
+
+OUT = Path("bench.json")
+
+
+def main() -> int:
+    """Run every benchmark."""
+    rows: list[Row] = []
+    for part in track((tick, fmu_step), description="bench", console=Console(stderr=True), transient=True):
+        rows += part.rows()
+    table = Table(title="Foreshock benchmarks (CPU time; reference measured in the same run)", title_justify="left")
+    for column in ("what", "value", "unit", "reference", "ratio", "aim", "holds"):
+        table.add_column(column, overflow="fold")
+    for r in rows:
+        reference = f"{r.reference:.1f} {r.reference_name}"
+        table.add_row(r.name, f"{r.value:.1f}", r.unit, reference, f"{r.ratio:.2f}", r.aim, "yes" if r.holds else "NO")
+    Console().print(table)
+    OUT.write_bytes(msgspec.json.format(msgspec.json.encode(rows), indent=2) + b"\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
