@@ -74,7 +74,7 @@ class Registry:
             module = self._extra[name] if name in self._extra else self._points[name].load()
         except (Exception, SystemExit) as e:  # a script without a main guard ends in sys.exit()
             raise PluginError(f"plugin {name}", f"import failed: {type(e).__name__}: {e}") from e
-        if any(p is module for p in self._manager.get_plugins()):
+        if any(p is module for _, p in self._manager.list_name_plugin()):
             return
         self._refuse_unknown_hooks(name, module)
         try:

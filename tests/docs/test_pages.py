@@ -18,6 +18,12 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 KNOWN = {"python", "sh", "toml", "text", "c", "json", ""}
 
+FILES = {
+    "bind-an-fmu.md": {"[binding]": ["my-binding.toml"], 'id = "my-slip"': ["my-scenario.toml"]},
+    "write-a-detector.md": {},
+}
+"""What a page tells its reader to save, by page and first line of the block."""
+
 
 def run_shell(example: Example) -> None:
     """Run a block with the environment's programs first on the path, in the page's own folder."""
@@ -35,8 +41,10 @@ def run_shell(example: Example) -> None:
 
 
 def run_toml(example: Example) -> None:
-    """Parse a block."""
+    """Parse a block; where the page says to write it to a file, that file is written."""
     tomllib.loads(example.parsed)
+    for name in FILES.get(Path(example.path).name, {}).get(example.parsed.split("\n", 1)[0], ()):
+        (example.namespace["__folder__"] / name).write_text(example.parsed)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))

@@ -21,7 +21,7 @@ HERE = Path(__file__).parent
 FOLDER = Path(foreshock_fmus.__file__).parent / "plants" / "balance"
 EVENTS = ("slip", "torso", "com", "tip", "contact", "fallen", "peak", "max_slip", "max_rate", "max_deviation", "acted")
 ACTS = ("step", "lock", "arms", "compliance", "mitigation")
-QUIET = dict.fromkeys(("dcm_noise", "footfall_push", "com_bias"), 0.0)
+QUIET = dict.fromkeys(("dcm_noise", "footfall_push"), 0.0)
 NOISELESS = dict.fromkeys(
     (
         "encoder_noise", "joint_rate_noise", "base_noise", "base_rate_noise", "attitude_noise", "gyro_noise",

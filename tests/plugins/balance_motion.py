@@ -213,3 +213,8 @@ def stepping(t: float) -> float:
 def stepping_com(t: float) -> float:
     """Lateral CoM of stepping in place at 0.6 s a step: LIPM amplitude a (1 - 1 / cosh(w0 T / 2)) for a = 75 mm."""
     return 0.026 * math.sin(math.pi * t / 0.6)
+
+
+def roll_pulse(t: float) -> float:
+    """Roll by 0.15 rad with a peak rate of 15/8 * 0.15 / 0.3 = 0.94 rad/s."""
+    return 0.15 * smooth_step(t, 2.0, 0.3)

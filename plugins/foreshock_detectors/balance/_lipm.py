@@ -37,22 +37,28 @@ def capture_time_s(capture_m: float, cop_m: float, edge_m: float, w0: float) -> 
     return math.log(run / start) / w0 if start > 0.0 else math.inf
 
 
-def crossing_time_s(com_m: float, velocity_m_s: float, edge_m: float, w0: float) -> float:
-    """Time (s) until the centre of mass passes an edge in positive direction, with the centre of pressure at that edge.
+def crossing_time_s(com_m: float, velocity_m_s: float, cop_m: float, edge_m: float, w0: float) -> float:
+    """Time (s) until the centre of mass passes an edge e in positive direction, at constant centre of pressure p <= e.
 
-    c(t) - p = A exp(w0 t) + B exp(-w0 t) with A = (xi0 - p) / 2, B = (c0 - c0' / w0 - p) / 2 and p = e. The zero is at
-    t = ln(-B / A) / (2 w0). 0 if the centre of mass is past the edge, inf if it never gets there (A <= 0).
+    c(t) - p = A u + B / u with u = exp(w0 t), A = (xi0 - p) / 2, B = (c0 - c0' / w0 - p) / 2. With r = e - p it passes
+    the edge at the larger root of A u^2 - r u + B = 0. 0 if it is past the edge, inf if it never gets there (A <= 0).
     """
     if com_m >= edge_m:
         return 0.0
-    a = com_m + velocity_m_s / w0 - edge_m
-    b = com_m - velocity_m_s / w0 - edge_m
-    # com < edge means a + b < 0, so that -b > a: the logarithm is positive whenever a is
-    return math.log(-b / a) / (2.0 * w0) if a > 0.0 else math.inf
+    a = 0.5 * (com_m + velocity_m_s / w0 - cop_m)
+    b = 0.5 * (com_m - velocity_m_s / w0 - cop_m)
+    r = edge_m - cop_m
+    if a <= 0.0:
+        return math.inf
+    # com < edge means a + b < r, so that 4 a b < r^2; rounding may still reach zero from below. A root below 1 lies in
+    # the past: the centre of mass turned round before the edge.
+    u = (r + math.sqrt(max(0.0, r * r - 4.0 * a * b))) / (2.0 * a)
+    return math.log(u) / w0 if u > 1.0 else math.inf
 
 
 def time_to_fall_s(
     hull: Polygon,
+    support: Polygon,
     com: tuple[float, float],
     velocity: tuple[float, float],
     w0: float,
@@ -63,13 +69,14 @@ def time_to_fall_s(
 
     While the capture point lies in the hull, some centre of pressure (now, or once the swing foot is down) stops the
     robot on its feet. Outside by a distance d > tolerance_m none does: along the outward normal n of the nearest
-    boundary point e, n . (xi - p) >= d for every p in the hull, so that d' >= w0 d. The best that the feet can do is to
-    keep the centre of pressure at e; with it the centre of mass passes e after crossing_time_s, and from there gravity
-    only accelerates the fall. Torso, arms and a step beyond the present feet could still help: the prediction is for
-    feet that stay where they are, hence later than or equal to the fall of a robot that does less.
+    boundary point e, n . (xi - p) >= d for every p in the hull, so that d' >= w0 d. The time is that until the centre
+    of mass passes e along n, with the centre of pressure as far out along n as the present support allows; from there
+    gravity only accelerates the fall. A swing foot that lands in time delays it; torso, arms and a step beyond the
+    present feet may prevent it.
 
     Args:
         hull: of both soles, on the ground (m).
+        support: of the soles that carry load; the hull itself where that is not known.
         com: centre of mass (m).
         velocity: its velocity (m/s).
         w0: natural frequency (rad/s).
@@ -81,7 +88,8 @@ def time_to_fall_s(
     if not distance > tolerance_m:
         return None
     ex, ey = nearest_boundary_point(hull, x, y)
-    nx, ny = x - ex, y - ey
-    nx, ny = nx / distance, ny / distance
-    time_s = crossing_time_s(nx * com[0] + ny * com[1], nx * velocity[0] + ny * velocity[1], nx * ex + ny * ey, w0)
+    nx, ny = (x - ex) / distance, (y - ey) / distance
+    edge = nx * ex + ny * ey
+    cop = min(edge, max(nx * a + ny * b for a, b in support))
+    time_s = crossing_time_s(nx * com[0] + ny * com[1], nx * velocity[0] + ny * velocity[1], cop, edge, w0)
     return time_s if time_s <= horizon_s else None

@@ -86,7 +86,9 @@ class Stability:
         measures["capture_point_x_m"], measures["capture_point_y_m"] = x, y
         margin = self.capture_margin_m = measures["capture_point_margin_m"] = signed_margin(both, x, y)
         if margin < 0.0:
-            fall = time_to_fall_s(both, com, velocity, w0, config.capture_tolerance_m, config.fall_horizon_s)
+            fall = time_to_fall_s(
+                both, support or both, com, velocity, w0, config.capture_tolerance_m, config.fall_horizon_s
+            )
             if fall is not None:
                 self.time_to_fall_s = measures["time_to_fall_s"] = fall
         if support is None:

@@ -38,7 +38,7 @@ class Approach:
         self._nearest = nearest
         if measured_ns > self._measured_ns:
             self._measured_ns = measured_ns
-            self._closing.push(at_ns, nearest.closest_m)
+            self._closing.push(at_ns, nearest.distance_m)
         d, s_p = nearest.distance_m, nearest.separation.s_p_m
         self._breach = d < s_p + (config.hysteresis_m if self._breach else 0.0)
         v_h = config.v_h_near_m_s if human_speed_m_s is None else human_speed_m_s
@@ -62,8 +62,8 @@ class Approach:
             "s_f_m": s.s_f_m,
             "s_p_m": s_p,
             "distance_m": d,
-            "closest_m": nearest.closest_m,
             "robot_speed_m_s": nearest.robot_speed_m_s,
+            "part_speed_m_s": nearest.part_speed_m_s,
         }
         if closing is not None:
             measures["closing_speed_m_s"] = closing
@@ -105,7 +105,7 @@ class Approach:
 
     def _contact_s(self) -> float | None:
         """Time to contact at the present closing speed; None unless he comes nearer."""
-        d, closing = self._nearest.closest_m, self._closing.value_m_s
+        d, closing = self._nearest.distance_m, self._closing.value_m_s
         if d <= 0.0:
             return 0.0
         if closing is None or closing < self._config.closing_m_s:

@@ -24,10 +24,9 @@ BREACH, NARROWING = "human-proximity-breach", "narrowing-clearance"
 class ProximityDetector:
     """Reports human-proximity-breach and narrowing-clearance for every human, or for ``""`` while nobody is there.
 
-    Every update moves the robot's capsules by its joint state and the human ones by their measured velocity, takes the
-    distances of all pairs, and reports the pair with the least d - S_p (the closest one, unless a faster part is nearer
-    in time), by python-fcl and checked. Malformed input raises ValueError or ConfigError. A human who has left a live
-    stream is reported absent for a while.
+    Every update moves the robot's capsules by its joint state and the human ones by their measured velocity, and
+    compares the distance d of the closest pair with S_p. Malformed input raises ValueError or ConfigError. A human who
+    has left a live stream is reported absent for a while.
 
     The closing speed of a human who has just been found is not known. Unless even the fastest approach could not reach
     S_p within the horizon, narrowing-clearance is then left out of the answer, hence unobserved; for the others too
@@ -44,7 +43,7 @@ class ProximityDetector:
         self._body = CapsuleKinematics(self._robot)
         self._body_ns = (-1, -1)
         self._people = People(self._config)
-        self._nearest = NearestPairs(self._config)
+        self._nearest = NearestPairs(self._config, self._robot)
         self._approaches: dict[str, Approach] = {}
 
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:
@@ -60,7 +59,7 @@ class ProximityDetector:
         evidence = tuple([SampleRef(s.channel, s.stamp_ns) for s in (joints, odometry, humans)])
         breaches, narrowings, unknown = self._judge(now_ns, stamp_ns, evidence)
         left = people.left(now_ns)
-        if people.crowd is None and "" not in left:
+        if not people.present and "" not in left:
             left.insert(0, "")
         for subject in left:
             breaches.append(self._no_breach(subject, stamp_ns, evidence))
@@ -84,18 +83,14 @@ class ProximityDetector:
     ) -> tuple[list[Indication], list[Indication], bool]:
         """Breaches and narrowings of those who are there, and whether anyone's narrowing is not known."""
         people, approaches = self._people, self._approaches
-        crowd = people.crowd
-        if crowd is None:
-            approaches.clear()
-            return [], [], False
-        if len(approaches) > len(crowd.people):
-            there = {p.id for p in crowd.people}
+        if len(approaches) > len(people.present):
+            there = {p.id for p in people.present}
             for name in [a for a in approaches if a not in there]:
                 del approaches[name]
-        age_s = (now_ns - self._body_ns[0]) / NS_PER_S
-        found = self._nearest.evaluate(self._body, age_s, people, crowd, now_ns)
+        age_s = max(now_ns - self._body_ns[0], 0) / NS_PER_S
+        found = self._nearest.evaluate(self._body, age_s, people, now_ns)
         breaches, narrowings, unknown = [], [], False
-        for person, nearest in zip(crowd.people, found, strict=True):
+        for person, nearest in zip(people.present, found, strict=True):
             approach = approaches.get(person.id)
             if approach is None:
                 approach = approaches[person.id] = Approach(self._config)

@@ -21,7 +21,8 @@ import math
 
 import numpy as np
 
-from foreshock_detectors.proximity._segments import Array
+from foreshock.messages import Vec3
+from foreshock_detectors.proximity._kinematics import Array
 
 __all__ = ["Topple"]
 
@@ -30,52 +31,46 @@ class Topple:
     """The robot at one instant: where it stands and how high it reaches.
 
     Args:
-        start: one end of each capsule, shape (n, 3), m.
-        along: from there to the other end, shape (n, 3), m.
+        ends: both ends of each capsule, shape (n, 2, 3), m.
         radius: shape (n,), m.
         support_m: capsules whose lowest point is within this of the lowest of all count as support.
     """
 
-    def __init__(self, start: Array, along: Array, radius: Array, support_m: float) -> None:
-        n = len(start)
-        ends = np.empty((2 * n, 3))
-        ends[:n] = start
-        np.add(start, along, ends[n:])
-        self._flat = ends[:, :2]
-        self._radius = radius = np.concatenate((radius, radius))
-        z = ends[:, 2]
-        low = z - radius
+    def __init__(self, ends: Array, radius: Array, support_m: float) -> None:
+        self._ends, self._radius = ends, radius[:, None]
+        z = ends[:, :, 2]
+        low = z - self._radius
         ground = low.min()
         self._height = z - ground
-        self._support = (low <= ground + support_m).nonzero()[0]
+        self._support = low <= ground + support_m
 
-    def edge_m(self, u: Array) -> float:
-        """Where the support ends in the horizontal direction u, shape (2,): e in m from the origin."""
-        feet = self._support
-        return float((self._flat[feet] @ u + self._radius[feet]).max())
+    def edge_m(self, u: Vec3) -> float:
+        """Where the support ends in the horizontal direction u: e in m from the origin."""
+        return self._reaches(u)[0]
 
-    def reach_m(self, u: Array, edge_m: float) -> float:
+    def reach_m(self, u: Vec3) -> float:
         """Rho (m): how far beyond the edge a fall in the direction u reaches."""
-        x = self._flat @ u
+        return self._reaches(u)[1]
+
+    def _reaches(self, u: Vec3) -> tuple[float, float]:
+        x = self._ends @ u
+        edge_m = float((x + self._radius)[self._support].max())
         x -= edge_m
         np.hypot(x, self._height, x)
         x += self._radius
-        return float(x.max())
+        return edge_m, float(x.max())
 
-    def clearance_m(self, start: Array, along: Array, radius: Array) -> float:
+    def clearance_m(self, centre: Vec3, ends: Array, radius: Array) -> float:
         """X - rho in m for one human; negative where the fall can hit.
 
         Args:
-            start: one end of each of his capsules, shape (k, 3), m, in the frame of the robot's.
-            along: from there to the other end, shape (k, 3), m.
+            centre: his (m), in the frame of the robot's ends; the direction of the fall is from its origin to there.
+            ends: both ends of each of his capsules relative to his centre, shape (k, 2, 3), m.
             radius: shape (k,), m.
         """
-        near, far = start[:, :2], start[:, :2] + along[:, :2]
-        x, y = (near.sum(axis=0) + far.sum(axis=0)).tolist()
-        away = math.hypot(x, y)
-        if away < 1e-6:  # he stands where the robot's base is: any direction will do
-            x, y, away = 1.0, 0.0, 1.0
-        u = np.array((x / away, y / away))
-        edge_m = self.edge_m(u)
-        nearest_m = float((np.minimum(near @ u, far @ u) - radius).min())
-        return nearest_m - edge_m - self.reach_m(u, edge_m)
+        away = math.hypot(centre[0], centre[1])
+        # where he stands in the robot itself, any direction will do
+        u = (centre[0] / away, centre[1] / away, 0.0) if away > 1e-6 else (1.0, 0.0, 0.0)
+        edge_m, reach_m = self._reaches(u)
+        nearest_m = float((ends @ u - radius[:, None]).min()) + centre[0] * u[0] + centre[1] * u[1]
+        return nearest_m - edge_m - reach_m

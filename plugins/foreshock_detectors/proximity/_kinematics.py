@@ -30,10 +30,9 @@ class CapsuleKinematics:
 
     Attributes:
         origin: base position in odom (m).
-        start: one end of each segment, shape (n, 3), m.
-        along: from there to the other end, shape (n, 3), m.
-        velocity: of the start, shape (n, 3), m/s.
-        spin: velocity of the other end minus that of the start, shape (n, 3), m/s.
+        q: configuration with the base's position at 0, shape (nq,).
+        ends: both ends of each segment, shape (n, 2, 3), m.
+        velocities: theirs, shape (n, 2, 3), m/s.
         radius: shape (n,), m; grows where a merged joint is beyond the range that its capsule covers.
         speed: by how much points inside may be faster than the capsule, from merged joints, shape (n,), m/s.
     """
@@ -41,29 +40,24 @@ class CapsuleKinematics:
     def __init__(self, robot: Robot) -> None:
         self._robot, self._model = robot, robot.model
         self._arrays = JointArrays(robot.model)
-        self._q: Array = robot.reference.copy()
+        self.q: Array = robot.reference.copy()
         self._v: Array = np.zeros(robot.model.nv)
         self._names: tuple[str, ...] | None = None
         capsules = robot.capsules
         n = len(capsules)
-        self.names = tuple(c.joint for c in capsules)
         self._joint = np.array([robot.model.getJointId(c.joint) for c in capsules], dtype=np.intp)
         a, b = np.array([c.a for c in capsules]), np.array([c.b for c in capsules])
         self._local = np.zeros((n, 2, 4))
-        self._local[:, 0, :3], self._local[:, 0, 3], self._local[:, 1, :3] = a, 1.0, b - a
-        self._twist = np.zeros((n, 6, 6))  # (v, w) of the joint to the start's velocity and the spin, in its axes
+        self._local[:, 0, :3], self._local[:, 1, :3], self._local[:, :, 3] = a, b, 1.0
+        self._twist = np.zeros((n, 6, 6))  # (v, w) of the joint to both ends' velocities, in its axes
         for k in range(n):
-            self._twist[k, :3, :3] = np.eye(3)
-            self._twist[k, :3, 3:] = -pin.skew(a[k])
-            self._twist[k, 3:, 3:] = -pin.skew(b[k] - a[k])
+            self._twist[k, :3, :3] = self._twist[k, 3:, :3] = np.eye(3)
+            self._twist[k, :3, 3:], self._twist[k, 3:, 3:] = -pin.skew(a[k]), -pin.skew(b[k])
         self._fitted = np.array([c.radius for c in capsules])
-        self.length: list[float] = [math.dist(c.a, c.b) for c in capsules]
         self._swept(robot)
         self.origin: Vec3 = (0.0, 0.0, 0.0)
         self._places = np.zeros((n, 4, 3))
-        self._points, self._rates = np.zeros((n, 2, 3)), np.zeros((n, 2, 3))
-        self.start, self.along = self._points[:, 0], self._points[:, 1]
-        self.velocity, self.spin = self._rates[:, 0], self._rates[:, 1]
+        self.ends, self.velocities = np.zeros((n, 2, 3)), np.zeros((n, 2, 3))
         self.radius, self.speed = self._fitted.copy(), np.zeros(n)
 
     def evaluate(self, joints: JointState, odometry: Odometry, odometry_lag_ns: int) -> None:
@@ -85,7 +79,7 @@ class CapsuleKinematics:
         if odometry_lag_ns:
             position, quaternion = _carried(position, quaternion, odometry, odometry_lag_ns / NS_PER_S)
         self.origin = position
-        q, v = self._q, self._v
+        q, v = self.q, self._v
         q[:7] = (0.0, 0.0, 0.0, *quaternion)
         v[:6] = odometry.linear + odometry.angular
         v[self._to_v] = joints.velocity
@@ -99,9 +93,9 @@ class CapsuleKinematics:
         arrays = self._arrays
         pin.forwardKinematics(self._model, arrays.data, q, v)
         places = arrays.placements.take(self._joint, 0, self._places, "clip")
-        np.matmul(self._local, places, self._points)
+        np.matmul(self._local, places, self.ends)
         rates = np.matmul(self._twist, arrays.velocities.take(self._joint, 0)[:, :, None])
-        np.matmul(rates.reshape(-1, 2, 3), places[:, :3], self._rates)
+        np.matmul(rates.reshape(-1, 2, 3), places[:, :3], self.velocities)
         if self._reach is not None:
             self._widen(self._reach, q, v)
 

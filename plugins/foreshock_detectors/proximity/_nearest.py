@@ -1,4 +1,4 @@
-"""For each human the pair of capsules that decides: the one with the least d - S_p."""
+"""How near each human is, and how large S_p is for him."""
 
 from __future__ import annotations
 
@@ -8,114 +8,115 @@ import numpy as np
 from foreshock.clock import NS_PER_S
 from foreshock_detectors.proximity._config import ProximityConfig
 from foreshock_detectors.proximity._fall import Topple
-from foreshock_detectors.proximity._kinematics import CapsuleKinematics
+from foreshock_detectors.proximity._kinematics import Array, CapsuleKinematics
 from foreshock_detectors.proximity._pair import PlacedCapsule, checked_distance_m
-from foreshock_detectors.proximity._people import Crowd, People
-from foreshock_detectors.proximity._segments import Array, PairDistances
+from foreshock_detectors.proximity._people import People, Person
+from foreshock_detectors.proximity._robot import Robot
+from foreshock_detectors.proximity._scene import Scene
 from foreshock_detectors.proximity._separation import ProtectiveSeparation, protective_separation
 
-__all__ = ["Nearest", "NearestPairs"]
+__all__ = ["Nearest", "NearestPairs", "approach_speeds"]
+
+_SUM = np.ones(3)
 
 
 class Nearest(msgspec.Struct, frozen=True, gc=False):
     """How near one human is.
 
     Attributes:
-        distance_m: d of the pair that is judged.
-        closest_m: d of the closest pair; the same unless a faster part is nearer in time.
-        robot_speed_m_s: v_r of the judged pair; negative where the robot's part withdraws.
-        separation: S_p of the judged pair.
+        distance_m: d, between the closest capsules.
+        part_speed_m_s: speed of the robot's closest capsule towards the closest point of him; negative if it withdraws.
+        robot_speed_m_s: v_r, the greatest such speed of all the robot's capsules.
+        separation: S_p.
     """
 
     distance_m: float
-    closest_m: float
+    part_speed_m_s: float
     robot_speed_m_s: float
     separation: ProtectiveSeparation
 
 
 class NearestPairs:
-    """Finds it: all pairs by arrays, then python-fcl, checked, on the closest and on the first to be reached.
+    """coal finds the closest pair, python-fcl measures it, the closed form checks that.
 
-    In S_p only S_r and S_s = v_r (T_r + age + share T_s) differ between the pairs of one human, and S_h, which is not
-    smaller for a nearer one. So the least d - S_p is at the closest pair or at the one with the least d - S_r - S_s.
+    v_r is not that of the closest part alone: a faster part behind it may arrive first.
     """
 
-    def __init__(self, config: ProximityConfig) -> None:
-        self._config = config
-        self._brake_s = config.reaction_s + config.stopping_speed_ratio * config.stopping_s
-        self._pairs = PairDistances(0, 0)
-        self._size = (0, 0)
+    def __init__(self, config: ProximityConfig, robot: Robot) -> None:
+        self._config, self._robot = config, robot
+        self._scenes: dict[str, Scene] = {}
 
-    def evaluate(
-        self, body: CapsuleKinematics, body_age_s: float, people: People, crowd: Crowd, now_ns: int
-    ) -> list[Nearest]:
-        """One record per person of the crowd, at now_ns.
+    def evaluate(self, body: CapsuleKinematics, body_age_s: float, people: People, now_ns: int) -> list[Nearest]:
+        """One record per person who is there, at now_ns.
 
         Args:
             body: the robot.
             body_age_s: how old its state is.
-            people: extrapolates.
-            crowd: the people.
+            people: with those who are there.
             now_ns: time of the answer.
 
         Raises:
             ValueError: a distance fails its check.
         """
-        config = self._config
-        size = len(body.start), len(crowd.radius)
-        if self._size != size:
-            self._pairs, self._size = PairDistances(*size), size
-        starts = people.start(crowd, now_ns, body.origin)
-        robot = (body.start, body.along, body.velocity, body.spin, body.radius)
-        self._pairs.evaluate(robot, (starts, crowd.along, crowd.radius))
-        gap, speed = self._pairs.gap, self._pairs.speed
-        speed += body.speed[:, None]
-        early = np.maximum(speed, 0.0)
-        early *= -(self._brake_s + body_age_s)
-        early += gap
-        topple = Topple(body.start, body.along, body.radius, config.fall_support_m) if config.fall_reach else None
+        config, present = self._config, people.present
+        if len(self._scenes) > len(present):
+            self._scenes = {p.id: self._scenes[p.id] for p in present if p.id in self._scenes}
+        topple = Topple(body.ends, body.radius, config.fall_support_m) if present and config.fall_reach else None
         found = []
-        for person, first, last in zip(crowd.people, crowd.first, crowd.first[1:], strict=False):
-            mine = slice(first, last)
-            clearance_m = None
-            if topple is not None:
-                clearance_m = topple.clearance_m(starts[mine], crowd.along[mine], person.radius)
-            rest_ns = people.ages_ns(person, now_ns)[1]
-            candidates: list[Nearest] = []
-            for i, j in {_least(gap[:, mine]): None, _least(early[:, mine]): None}:
-                k = first + j
-                distance_m = checked_distance_m(
-                    _placed(body.start, body.along, body.radius, i),
-                    _placed(starts, crowd.along, crowd.radius, k),
-                    config.consistency_m,
-                )
-                robot_speed_m_s = float(speed[i, k])
-                closest_m = candidates[0].distance_m if candidates else distance_m
-                separation = protective_separation(
-                    config,
-                    distance_m=distance_m,
-                    human_speed_m_s=person.speed_m_s,
-                    human_age_s=rest_ns / NS_PER_S,
-                    robot_speed_m_s=robot_speed_m_s,
-                    robot_age_s=body_age_s,
-                    uncertainty_m=person.uncertainty_m,
-                    fall_clearance_m=clearance_m,
-                )
-                candidates.append(Nearest(distance_m, closest_m, robot_speed_m_s, separation))
-            found.append(min(candidates, key=_margin_m))
+        for person in present:
+            centre = people.centre(person, now_ns, body.origin)
+            i, j, point = self._scene(person).closest(body, centre)
+            distance_m = checked_distance_m(
+                _placed(body.ends[i], body.radius[i]),
+                _placed(person.ends[j] + centre, person.radius[j]),
+                config.consistency_m,
+            )
+            speeds = approach_speeds(body.ends, body.velocities, point + centre)
+            speeds += body.speed
+            robot_speed_m_s = float(speeds.max())
+            separation = protective_separation(
+                config,
+                distance_m=distance_m,
+                human_speed_m_s=person.speed_m_s,
+                human_age_s=people.ages_ns(person, now_ns)[1] / NS_PER_S,
+                robot_speed_m_s=robot_speed_m_s,
+                robot_age_s=body_age_s,
+                uncertainty_m=person.uncertainty_m,
+                fall_clearance_m=None if topple is None else topple.clearance_m(centre, person.ends, person.radius),
+            )
+            found.append(Nearest(distance_m, float(speeds[i]), robot_speed_m_s, separation))
         return found
 
-
-def _margin_m(nearest: Nearest) -> float:
-    return nearest.distance_m - nearest.separation.s_p_m
-
-
-def _least(values: Array) -> tuple[int, int]:
-    row, column = divmod(int(values.argmin()), int(values.shape[1]))
-    return row, column
+    def _scene(self, person: Person) -> Scene:
+        scene = self._scenes.get(person.id)
+        if scene is None or not scene.fits(person):
+            scene = self._scenes[person.id] = Scene(self._robot, person)
+        scene.measure(person)
+        return scene
 
 
-def _placed(start: Array, along: Array, radius: Array, k: int) -> PlacedCapsule:
-    x, y, z = start[k].tolist()
-    dx, dy, dz = along[k].tolist()
-    return PlacedCapsule((x, y, z), (x + dx, y + dy, z + dz), float(radius[k]))
+def approach_speeds(ends: Array, velocities: Array, point: Array) -> Array:
+    """Greatest speed (m/s) of each of n capsules' axes along the line from its closest point to a point; shape (n,).
+
+    Args:
+        ends: both ends of each, shape (n, 2, 3), m.
+        velocities: theirs, shape (n, 2, 3), m/s. In between they are linear, so that the greatest is at an end.
+        point: shape (3,), m.
+    """
+    start = ends[:, 0]
+    along = ends[:, 1] - start
+    rest = point - start
+    # a ball has no direction; its numerator is exactly 0
+    t = ((rest * along) @ _SUM) / np.maximum((along * along) @ _SUM, 1e-30)
+    np.minimum(np.maximum(t, 0.0, out=t), 1.0, out=t)
+    rest -= along * t[:, None]
+    distance = np.sqrt((rest * rest) @ _SUM)
+    towards = (velocities * rest[:, None]) @ _SUM
+    speeds = np.maximum(towards[:, 0], towards[:, 1])
+    # a point on the axis lies in no direction; then the quotient is bounded by the speed itself
+    return np.asarray(speeds / np.maximum(distance, 1e-12), dtype=np.float64)
+
+
+def _placed(ends: Array, radius: float) -> PlacedCapsule:
+    a, b = ends.tolist()
+    return PlacedCapsule(tuple(a), tuple(b), float(radius))

@@ -14,6 +14,7 @@ the real supervisor, so that what is tested is what a robot will get.
 from __future__ import annotations
 
 import math
+import math
 import statistics
 from collections.abc import Mapping, Sequence
 from itertools import pairwise

@@ -60,7 +60,7 @@ def first_present_s(played: Play) -> float:
 def test_onset_is_where_the_closed_form_has_it(load: float) -> None:
     """From cold, theta = k^2 (1 - exp(-t / tau)) reaches the limit at t = tau ln(k^2 / (k^2 - limit))."""
     expected_s = TAU_S * math.log(load**2 / (load**2 - SETTINGS.limit))
-    onset_s = first_present_s(play(walking(lambda t: load * RATED_N_M, expected_s + 0.5)))
+    onset_s = first_present_s(play(walking(lambda _: load * RATED_N_M, expected_s + 0.5)))
     # the first sample is the origin of time, and the onset falls on a sample
     assert 0.0 <= onset_s - PERIOD_NS / 1e9 - expected_s <= PERIOD_NS / 1e9
 
@@ -87,10 +87,8 @@ def test_a_gap_in_the_stream_never_cools() -> None:
 
 def test_a_joint_without_torque_is_unobserved() -> None:
     """A JointState may carry no efforts at all: then nothing is known, and nothing is said."""
-    silent = [
-        Sample(s.stamp_ns, s.channel, JointState(("hip", "knee"), (0.0, 0.6)), s.seq)
-        for s in walking(lambda t: 5.0, 1.0)
-    ]
+    bare = JointState(("hip", "knee"), (0.0, 0.6))
+    silent = [Sample(s.stamp_ns, s.channel, bare, s.seq) for s in walking(lambda _: 5.0, 1.0)]
     played = play(silent)
     assert all(d.indications == () for d in played.decisions)
     assert played.decisions[-1].trust.unobserved == (KIND.id,)

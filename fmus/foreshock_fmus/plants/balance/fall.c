@@ -10,6 +10,7 @@
 #define UPPER_LEVER 0.3529 /* m, its centre above the hips */
 #define UPPER_INERTIA 5.25 /* kg m2, about its centre */
 #define LEGS_MASS (TALOS_MASS - UPPER_MASS)
+#define LEGS_INERTIA 2.464  /* kg m2, about their centre */
 #define LEGS_CENTRE 0.6087 /* of the line from the ground to the hips, so that the CoM is at TALOS_COM_HEIGHT */
 #define LINE_MASS (LEGS_MASS * LEGS_CENTRE + UPPER_MASS)
 #define SHORTEST 0.45 /* of the first length: knees at their limit */
@@ -67,21 +68,23 @@ void fall_rhs(const Plant *self, const double *vars, const double f[T_SIZE], dou
         force = vars[V_contact_stiffness] * depth + vars[V_contact_damping] * (point_v - f[T_HUMAN_RATE]);
         if (force < 0.0) force = 0.0;
     }
+    const int near = f[T_HUMAN] > 0.0 && -depth < vars[V_turn_time] * (point_v - f[T_HUMAN_RATE]);
     /* hips: held stiffly, or turned away from the fall and slack once they touch */
     double bend = psi - alpha, bend_rate = wp - wa, limit = vars[V_hip_torque];
     double hold = -vars[V_fall_hip_stiffness] * bend - vars[V_fall_hip_damping] * bend_rate;
     hold = hold > limit ? limit : hold < -limit ? -limit : hold;
-    double hip = (1.0 - give) * hold - (self->contact_peak > 0.0 ? 0.0 : give * limit), over = fabs(bend) - 0.52;
+    double hip = near ? (1.0 - give) * hold - give * vars[V_turn_away] * limit : hold, over = fabs(bend) - 0.52;
     if (over > 0.0) hip -= (bend > 0.0 ? 1.0 : -1.0) * vars[V_stop_stiffness] * over + vars[V_stop_damping] * bend_rate;
     /* knees: stiff, or giving way against a damper */
     double shorter = self->fall_length - l, stiff = vars[V_leg_stiffness] * shorter - vars[V_leg_damping] * vl;
-    double leg = (1.0 - give) * (stiff + LINE_MASS * GRAVITY * cos(self->fall_start)) - give * vars[V_knee_damping] * vl;
+    const double knees = give * vars[V_knee_give];
+    double leg = (1.0 - knees) * (stiff + LINE_MASS * GRAVITY * cos(self->fall_start)) - knees * vars[V_knee_damping] * vl;
     if (l < SHORTEST * self->fall_length) leg += vars[V_leg_stiffness] * (SHORTEST * self->fall_length - l) - vars[V_leg_damping] * vl;
     const double mm = LEGS_MASS * LEGS_CENTRE * LEGS_CENTRE + UPPER_MASS;
     double qa = LINE_MASS * GRAVITY * l * sa - hip - force * l * ca - 2.0 * mm * l * vl * wa - moment * l * wp * wp * sd;
     double qp = moment * GRAVITY * sp + hip - force * (zc * cp - b * sp) - moment * (2.0 * vl * wa * cd - l * wa * wa * sd);
     double ql = -LINE_MASS * GRAVITY * ca + leg - force * sa + mm * l * wa * wa + moment * wp * wp * cd;
-    double A = mm * l * l, B = moment * l * cd, C = UPPER_INERTIA + moment * UPPER_LEVER, D = moment * sd, E = mm;
+    double A = mm * l * l + LEGS_INERTIA, B = moment * l * cd, C = UPPER_INERTIA + moment * UPPER_LEVER, D = moment * sd, E = mm;
     double ap = (qp - B * qa / A - D * ql / E) / (C - B * B / A - D * D / E);
     df[T_TURN] = wa, df[T_ROLL] = wp, df[T_LENGTH] = vl, df[T_HUMAN] = f[T_HUMAN_RATE];
     df[T_TURN_RATE] = (qa - B * ap) / A;

@@ -29,7 +29,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         rated_n_m: torque that the motor can give continuously, by joint (N m), from its data sheet. The default is a
-            quarter of the URDF's peak torque of TALOS's knees (440 N m), since servo motors peak at 3 to 5 times rated.
+            quarter of the URDF's peak torque of TALOS's knees (300 N m), since servo motors peak at 3 to 5 times rated.
         time_constant_s: thermal time constant of the motor (s), from its data sheet; 5 min is a frame of 1 kW.
         start: thermal level assumed at reset, when nothing is known of the past; 0.5 is a motor at 70 % torque so far.
         limit: thermal level from which the motor is overloaded; drives warn at 80 to 90 %.
@@ -37,7 +37,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     rated_n_m: dict[str, float] = msgspec.field(
-        default_factory=lambda: {"leg_left_4_joint": 110.0, "leg_right_4_joint": 110.0}
+        default_factory=lambda: {"leg_left_4_joint": 75.0, "leg_right_4_joint": 75.0}
     )
     time_constant_s: float = 300.0
     start: float = 0.5

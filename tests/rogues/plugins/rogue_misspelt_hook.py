@@ -1,0 +1,8 @@
+"""A plugin with a misspelt hook, marked as one."""
+
+from foreshock.hookspecs import hookimpl
+
+
+@hookimpl
+def foreshock_detector():
+    return ()

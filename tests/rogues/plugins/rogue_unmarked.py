@@ -1,0 +1,5 @@
+"""A plugin whose hook lacks @hookimpl."""
+
+
+def foreshock_detectors():
+    return ()
