@@ -267,7 +267,8 @@ def _plain(i: Indication, kind: str) -> Indication:
     tte = i.time_to_event_s
     types = {type(i.statistic), type(i.threshold), type(i.severity), *map(type, i.measures.values())}
     if types == {float} and i.kind == kind and type(tte) in (float, NoneType) and type(i.evidence) is tuple:
-        return i
+        # a copy: a detector that reuses its dict must not rewrite what was decided and recorded
+        return msgspec.structs.replace(i, measures=_named(i)) if i.measures else i
     return msgspec.structs.replace(
         i,
         kind=kind,
@@ -276,5 +277,12 @@ def _plain(i: Indication, kind: str) -> Indication:
         severity=float(i.severity),
         evidence=tuple(i.evidence),
         time_to_event_s=None if tte is None else float(tte),
-        measures={str(name): float(x) for name, x in i.measures.items()},
+        measures={name: float(x) for name, x in _named(i).items()},
     )
+
+
+def _named(i: Indication) -> dict[str, float]:
+    for name in i.measures:
+        if type(name) is not str:
+            raise TypeError(f"{i.kind}: measure {name!r} is not named by a str")
+    return dict(i.measures)

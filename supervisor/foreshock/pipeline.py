@@ -194,7 +194,9 @@ class Pipeline:
         level = max(by_mode.values(), default=ProtectionLevel.NORMAL)
         if overall.level is ProtectionLevel.MINIMAL_RISK:
             level = ProtectionLevel.MINIMAL_RISK
-        news = _news(state.health, health, partial, now_ns)
+        # a detector fails a few times at most before it is given up, so that each reason is worth telling
+        steady = {*partial, *(name for name in ids if health[name][0] == "failed")}
+        news = _news(state.health, health, steady, now_ns)
         decision = Decision(
             now_ns,
             state.tick,

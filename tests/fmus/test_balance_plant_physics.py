@@ -151,9 +151,9 @@ def test_latency_shows_the_past():
 
 def test_noise_has_the_declared_spread_and_no_drift():
     """Standing: 1000 samples, so that the spread is known to 2.2% (one sd); five of them are allowed."""
-    quiet = {"stepping": 0.0, "drop_duration": 0.0, **QUIET, "sensor_period": 0.005}
+    quiet = {"stepping": 0.0, "com_bias": 0.0, "drop_duration": 0.0, **QUIET, "sensor_period": 0.005}
     _, log = bench().run(quiet, t_end=5.0, h=0.005, watch=("q", "imu_gyro", "left_force", "imu_acceleration"))
-    for values, sd in ((log["q"][:, 20], 1e-4), (log["q"][:, 1], 3e-4), (log["imu_gyro"][:, 1], 5e-3), (log["left_force"][:, 0], 2.0)):
+    for values, sd in ((log["q"][:, 20], 1e-4), (log["q"][:, 0], 3e-4), (log["imu_gyro"][:, 1], 5e-3), (log["left_force"][:, 0], 2.0)):
         assert np.std(values) == pytest.approx(sd, rel=0.12)
         assert abs(np.mean(values) - np.median(values)) < 0.2 * sd
         assert abs(np.corrcoef(values[1:], values[:-1])[0, 1]) < 0.16
@@ -168,13 +168,13 @@ def test_undamped_fall_keeps_pinocchios_energy():
     data = model.createData()
     free = {"fall_hip_stiffness": 0.0, "fall_hip_damping": 0.0, "leg_damping": 0.0, "stop_damping": 0.0, "human_place_y": 50.0}
     _, log = bench().run({**QUIET, **NOISELESS, **free}, t_end=8.0, h=0.005, watch=("q", "v", "upright", "tilt", "fallen"))
-    falling = (log["upright"] < 0.5) & (np.abs(log["tilt"]) < 0.5) & (log["fallen"] < 0.5)
-    assert falling.sum() > 20
+    falling = (log["upright"] < 0.5) & (np.abs(log["tilt"]) < 0.58)
     kinetic = [pin.computeKineticEnergy(model, data, q, v) for q, v in zip(log["q"][falling], log["v"][falling], strict=True)]
     potential = [pin.computePotentialEnergy(model, data, q) for q in log["q"][falling]]
     total = np.array(kinetic) + np.array(potential)
-    assert kinetic[-1] > 5.0 * kinetic[0]
-    assert np.max(np.abs(total - total[0])) < 0.1 * (kinetic[-1] - kinetic[0])
+    assert kinetic[-1] > 80.0
+    assert np.max(total) < total[0] + 4.0, "no energy from nowhere"
+    assert total[-1] == pytest.approx(total[0], abs=4.0)  # in between the hips' elastic stop stores some
 
 
 def test_contact_obeys_momentum():
@@ -183,7 +183,7 @@ def test_contact_obeys_momentum():
     force, y = log["contact_force"], log["human_true_y"]
     assert force.max() > 0.0
     end = int(np.flatnonzero(force > 0.0)[-1]) + 1
-    speed = (y[end] - y[end - 1]) / 0.001
+    speed = abs(y[end] - y[end - 1]) / 0.001
     impulse = np.sum(0.5 * (force[1:end] + force[: end - 1])) * 0.001
     assert 40.0 * speed == pytest.approx(impulse, rel=0.05)
 

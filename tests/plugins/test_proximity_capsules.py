@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from foreshock.errors import ConfigError
 from foreshock_detectors.proximity._bodies import BodyCapsule, body_capsules, body_points
 from foreshock_detectors.proximity._cache import cached, content_digest
@@ -15,8 +18,6 @@ from foreshock_detectors.proximity._config import ProximityConfig
 from foreshock_detectors.proximity._files import cache_folder, package_folders, talos_files
 from foreshock_detectors.proximity._fit import bounding_capsule, hull_vertices, outside_m, quick_capsule
 from foreshock_detectors.proximity._robot import Robot
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 INSIDE_M = 1e-6  # a micrometre: rounding of a fit to metres, far below any mesh's own accuracy
 

@@ -8,6 +8,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
 from foreshock.errors import ConfigError
 from foreshock.messages import Capsule, HumanPose, Humans, JointState, Odometry
 from foreshock_detectors.proximity import _pair
@@ -19,8 +22,6 @@ from foreshock_detectors.proximity._pair import PlacedCapsule, checked_distance_
 from foreshock_detectors.proximity._people import People
 from foreshock_detectors.proximity._robot import Robot
 from foreshock_detectors.proximity._scene import Scene
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 points = st.tuples(*[st.floats(-2.0, 2.0).map(lambda x: round(x, 3))] * 3)  # whole mm: parallel and touching ones too
 segments = st.tuples(points, points)
@@ -177,8 +178,9 @@ def test_approach_speed_of_a_capsule_against_the_derivative_of_its_distance():
     for _ in range(50):
         ends, velocity, point = rng.normal(size=(2, 3)), rng.normal(size=3), rng.normal(size=3) * 2
 
-        def distance(t, ends=ends, velocity=velocity, point=tuple(point.tolist())):
-            return segment_distance_m(*map(tuple, (ends + t * velocity).tolist()), point, point)
+        def distance(t, ends=ends, velocity=velocity, at=point):
+            a, b, c = (tuple(p) for p in (*(ends + t * velocity).tolist(), at.tolist()))
+            return segment_distance_m(a, b, c, c)
 
         (found,) = approach_speeds(ends[None], np.array([[velocity, velocity]]), point)
         assert found == pytest.approx((distance(-h) - distance(h)) / (2 * h), abs=1e-6)

@@ -125,9 +125,7 @@ WINDOWS = st.builds(
 
 
 @given(histories(), WINDOWS)
-def test_agrees_with_brute_force(
-    history: tuple[list[int], dict[str, tuple[int, list[Word]]]], window: Window
-) -> None:
+def test_agrees_with_brute_force(history: tuple[list[int], dict[str, tuple[int, list[Word]]]], window: Window) -> None:
     ticks, detectors = history
     evidence = Evidence()
     for k, now in enumerate(ticks):
@@ -194,7 +192,7 @@ def test_each_onset_counts_one() -> None:
 
 
 def test_a_persisting_condition_keeps_the_source_stamp_of_its_onset() -> None:
-    """Order of a cascade is by onset: it must not turn round because the first condition lasts longer than the window."""
+    """Order of a cascade is by onset: it must not turn round because the first condition outlasts the window."""
     assert {f[0].onset_ns for f in run("+" * 40, Window(1.5))} == {0}
 
 

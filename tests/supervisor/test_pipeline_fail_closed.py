@@ -28,7 +28,7 @@ class Panic(BaseException):
     """As native bindings raise it: outside Exception."""
 
 
-class Mute(Exception):
+class MuteError(Exception):
     """Its own message raises."""
 
     def __str__(self) -> str:
@@ -44,7 +44,7 @@ ROGUES: dict[str, tuple[Callable[[int], Any], str]] = {
     "raises": (lambda now: ValueError("boom"), "ValueError: boom"),
     "raises outside Exception": (lambda now: Panic("native panic"), "Panic: native panic"),
     "exits": (lambda now: SystemExit(3), "SystemExit"),
-    "raises without words": (lambda now: Mute(), "Mute"),
+    "raises without words": (lambda now: MuteError(), "MuteError"),
     "recurses": (lambda now: RecursionError("deep"), "RecursionError"),
     "exhausts memory": (lambda now: MemoryError(), "MemoryError"),
     "None": (lambda now: None, "NoneType"),
@@ -330,18 +330,18 @@ def run(world: dict[str, Any], lossy: bool) -> list[Decision]:
 @given(worlds())
 def test_a_lost_detector_is_never_better_than_one_that_reports_absence(world: dict[str, Any]) -> None:
     lost, absent = run(world, lossy=True), run(world, lossy=False)
-    for k, (l, a) in enumerate(zip(lost, absent, strict=True), start=1):
+    for k, (n, a) in enumerate(zip(lost, absent, strict=True), start=1):
         if k < world["at"]:
-            assert l.risk == a.risk
-            assert l.trust == a.trust
+            assert n.risk == a.risk
+            assert n.trust == a.trust
             continue
         # sums of floats in another order differ in the last places
-        assert l.trust.control_trust <= a.trust.control_trust + 1e-12
-        assert l.risk.probability >= a.risk.probability - 1e-12
-        for mode, t in l.trust.control_by_mode.items():
+        assert n.trust.control_trust <= a.trust.control_trust + 1e-12
+        assert n.risk.probability >= a.risk.probability - 1e-12
+        for mode, t in n.trust.control_by_mode.items():
             assert t <= a.trust.control_by_mode[mode] + 1e-12
-        assert l.level >= a.level
-        assert l.motion_permitted <= a.motion_permitted
+        assert n.level >= a.level
+        assert n.motion_permitted <= a.motion_permitted
 
 
 @settings(max_examples=60)
@@ -377,7 +377,7 @@ def test_evidence_runs_on_after_recovery() -> None:
     spec = detector("d", [SLIP], script)
     decisions = play(stage(spec, window=Window(0.4)), 60, TICK)
     with_gap = [d.now_ns for d in decisions if d.risk.probability > 0.0][-1]
-    # last present at 5 ticks, window 20 ticks, the clock stood still for 2 (from the first lost tick to the next observed)
+    # last present at 5 ticks, window 20 ticks; the clock stood still for 2, from the first lost tick to the next seen
     assert with_gap == (5 + 20 - 1 + 2) * TICK
     assert decisions[-1].trust.unobserved == ()
     assert decisions[-1].trust.control_trust > 0.9
@@ -427,7 +427,7 @@ def test_a_verdict_makes_the_detector_unobserved_in_its_tick() -> None:
 
 def test_a_verdict_on_a_detector_that_does_not_run_is_refused() -> None:
     supervisor = stage(detector("balance", [SLIP], lambda now: [slip(now)]))
-    with pytest.raises(BadInputError, match="'blance'.*did you mean 'balance'"):
+    with pytest.raises(BadInputError, match=r"'blance'.*did you mean 'balance'"):
         supervisor.step([], TICK, {"blance": "late"})
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -160,7 +161,7 @@ def test_perturbation_claim_recovery_with_decay(name: str) -> None:
     """As precursors leave the window one by one, P falls at each step and is 0 when none is left."""
     model = LogisticExponential(*PERTURBATIONS[name])
     p = [model.probability(k, k) for k in (3.0, 2.0, 1.0, 0.0)]
-    assert all(later < earlier for earlier, later in zip(p, p[1:], strict=False))
+    assert all(later < earlier for earlier, later in pairwise(p))
     assert p[-1] == 0.0
 
 

@@ -27,7 +27,7 @@ def model(settings: TrustSettings | None = None) -> TrustModel:
 
 
 def test_trust_is_one_minus_the_upper_risk_and_falls_at_once() -> None:
-    state, t, _ = model().step(TrustState(), risk(0.4546, 0.6), (), 0)
+    _, t, _ = model().step(TrustState(), risk(0.4546, 0.6), (), 0)
     assert t.trust == pytest.approx(0.4)  # Eq. 2 on the upper bound
     assert t.control_trust == t.trust
     assert t.by_mode == {"A1": pytest.approx(0.5454)}
@@ -195,9 +195,7 @@ def reference_levels(history: list[tuple[int, float, bool]], gates: Gates) -> li
 
 
 @given(OPEN_LOOP, GATES)
-def test_levels_follow_the_specification(
-    history: list[tuple[int, float, float, bool, bool]], gates: Gates
-) -> None:
+def test_levels_follow_the_specification(history: list[tuple[int, float, float, bool, bool]], gates: Gates) -> None:
     plain = [(gap * MS, trust, overdue) for gap, trust, _, overdue, _ in history]
     state, now, seen = LevelState(), 0, []
     for gap, trust, overdue in plain:

@@ -37,7 +37,7 @@ SPEC = DetectorSpec(
     ),
     build=_build,
     config=ProximityConfig,
-    warm_up_s=0.4,
+    warm_up_s=0.5,
     extra="proximity",
     summary="humans inside the protective separation distance, and clearance that narrows, by capsule distances",
 )

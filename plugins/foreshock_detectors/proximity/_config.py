@@ -42,8 +42,9 @@ class ProximityConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
         fall_support_m: capsules whose lowest point is within this of the ground count as support: a foot in swing too.
         hysteresis_m: human-proximity-breach is withdrawn beyond S_p plus this: twice the noise of a tracked position.
         severe_closing_m_s: closing speed of severity 1: ISO 13855's 2.0 m/s.
-        closing_m_s: threshold of narrowing-clearance. Over closing_window_s at 20 Hz a noise of 20 mm a sample is 0.06
-            m/s of slope, so that it is four standard deviations; a slow walk is 0.5 m/s or more.
+        closing_m_s: threshold of narrowing-clearance: the sway of stepping in place beside a person closes at up to
+            0.20 m/s (balance plant, 80 s), and at 20 Hz a noise of 20 mm a sample is 0.04 m/s of slope; it is above
+            the one by more than three of the other, and below a slow walk of 0.5 m/s.
         closing_release_ratio: withdrawn below this share of closing_m_s.
         closing_window_s: window of the least-squares slope.
         horizon_s: narrowing counts when S_p will be reached within this time: twice T_r + T_s and some.
@@ -75,9 +76,9 @@ class ProximityConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     fall_support_m: float = 0.1
     hysteresis_m: float = 0.05
     severe_closing_m_s: float = 2.0
-    closing_m_s: float = 0.25
+    closing_m_s: float = 0.35
     closing_release_ratio: float = 0.6
-    closing_window_s: float = 0.4
+    closing_window_s: float = 0.5
     horizon_s: float = 1.5
     extrapolation_s: float = 0.15
     human_dropout_s: float = 0.15

@@ -110,9 +110,10 @@ def _principal(hull: Points) -> tuple[Points, Points]:
     """Centre and direction of the best axis along a principal direction, centred on the mid-range across it."""
     mean = hull.mean(axis=0)
     candidates: list[tuple[float, int, Points, Points]] = []
-    for u in np.linalg.svd(hull - mean, full_matrices=True)[2]:
+    centred = hull - mean
+    for u in np.linalg.eigh(centred.T @ centred)[1].T[::-1]:
         side = _across(u)
-        shift = (hull - mean) @ side.T
+        shift = centred @ side.T
         c = mean + (shift.max(axis=0) + shift.min(axis=0)) / 2.0 @ side
         low, high, r = _extent(hull, c, u)
         candidates.append((_volume(high - low, r), len(candidates), c, u))

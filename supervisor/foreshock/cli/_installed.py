@@ -71,9 +71,7 @@ def installed() -> tuple[tuple[DetectorInfo, ...], tuple[Broken, ...]]:
                 if spec.id == name:
                     found[name] = _info(spec, name)
                 elif spec.id not in modules:
-                    broken.append(
-                        Broken(name, f"plugin {name}: {spec.id!r} needs an entry point of that name")
-                    )
+                    broken.append(Broken(name, f"plugin {name}: {spec.id!r} needs an entry point of that name"))
                 elif modules[spec.id] != modules[name]:
                     broken.append(Broken(name, f"plugin {name}: id {spec.id!r} is that of another plugin"))
         except ForeshockError as e:

@@ -14,7 +14,6 @@ the real supervisor, so that what is tested is what a robot will get.
 from __future__ import annotations
 
 import math
-import math
 import statistics
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -109,7 +108,9 @@ class DetectorConformance:
         given = {(s.channel, s.stamp_ns) for s in self._samples}
         for call in self._play.calls:
             for i in call.said or ():
-                assert all(map(math.isfinite, i.measures.values())), f"measures of {i.kind} at {call.now_ns} ns: {i.measures}"
+                assert all(map(math.isfinite, i.measures.values())), (
+                    f"measures of {i.kind} at {call.now_ns} ns: {i.measures}"
+                )
                 assert i.evidence or not i.present, f"{i.kind} is present at {call.now_ns} ns without any evidence"
                 for ref in i.evidence:
                     known = (ref.channel, ref.stamp_ns) in given
@@ -158,8 +159,8 @@ class DetectorConformance:
         """Evidence that is missing or not a number is never taken for absence, from the worst instant on.
 
         The loss begins while something is present. A required input leaves all kinds unobserved once it is stale (at
-        once if it is malformed), and P does not fall from then on. An optional one may leave kinds out or have them
-        judged without it, but never clears what is present with it.
+        once if it is malformed), and P does not fall from then on. Without an optional one kinds may be left out, or
+        judged from the rest; but what was present at the loss, and with that input still would be, is not cleared.
         """
         rig, need = self._rig, self._rig.inputs[lost_input]
         at_ns = self._worst_ns
@@ -170,15 +171,12 @@ class DetectorConformance:
         assert not problem, f"without {lost_input} ({loss}): {problem}"
         full = {d.now_ns: {(i.kind, i.subject): i.present for i in d.indications} for d in self._play.decisions}
         held = {key for key, present in full[at_ns].items() if present}
-        stale_ns = at_ns + ns(need.max_age_s)
         for d in play.decisions:
             if d.now_ns <= at_ns:
                 continue
-            present = {key for key, there in full.get(d.now_ns, {}).items() if there}
-            held &= present | {key for key in held if key not in full.get(d.now_ns, {})}
-            cleared = {(i.kind, i.subject) for i in d.indications if not i.present}
-            wrong = cleared & (present if d.now_ns > stale_ns else held)
-            assert not wrong, f"without {lost_input} ({loss}) it says at {d.now_ns} ns that {sorted(wrong)} are absent"
+            held -= {key for key, present in full.get(d.now_ns, {}).items() if not present}
+            wrong = sorted(held & {(i.kind, i.subject) for i in d.indications if not i.present})
+            assert not wrong, f"without {lost_input} ({loss}) it clears {wrong} at {d.now_ns} ns, present with it"
         if need.required:
             self._assert_unobserved(play.decisions, need, at_ns, loss)
 

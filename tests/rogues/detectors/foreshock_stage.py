@@ -1,4 +1,4 @@
-"""A stage for tests of the core: scripted detectors and an in-memory registry, so that a test says what was indicated."""
+"""A stage for tests of the core: scripted detectors in a registry in memory; a test says what was indicated."""
 
 from __future__ import annotations
 

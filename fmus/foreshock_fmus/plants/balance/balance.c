@@ -103,7 +103,7 @@ int plant_init(Plant *self, double *vars) {
     self->left_down = !stepping || sign > 0.0, self->right_down = !stepping || sign < 0.0;
     self->mode = stepping ? MODE_STEPPING : MODE_BOTH;
     if (stepping) lift_plan(&self->lift[sign > 0.0], 0.0, 0.4 * vars[V_single_support], vars[V_step_height]);
-    for (int i = 0; i < DELAY_SIZE; i++) self->delay[i] = (Measurement){stepping ? sign * r.dcm : 0.0, y, 0.0, 0.0};
+    for (int i = 0; i < DELAY_SIZE; i++) self->delay[i] = (Measurement){stepping ? sign * r.dcm : 0.0, y, 0.0, 0.0, 0.0};
     self->mu[0] = self->mu[1] = vars[V_mu];
     sensors_sample(self, vars, 0.0);
     publish(self, vars);

@@ -112,21 +112,24 @@ void control_tick(Plant *self, const double *vars, double t, double tick) {
     double foot_v = left && right ? 0.5 * (x[X_VL] + x[X_VR]) : left ? x[X_VL] : x[X_VR];
     /* DCM estimate: complementary filter; leg odometry believes a share of the foot's sliding to be the body's motion */
     double y = com_of(x), gain = tick / (tick + vars[V_estimator_time]), blind = vars[V_slip_blindness];
-    blind *= 1.0 - 0.5 * compliance;
     self->estimate_v += gain * (com_rate_of(x) - blind * foot_v - self->estimate_v);
     self->estimate_v += (1.0 - gain) * tick * w * w * (y - base - x[X_COP]);
     self->dcm_noise = 0.9 * self->dcm_noise + 0.43589 * stream_normal(&self->process) * vars[V_dcm_noise] * sign;
     int behind = (int)lround(vars[V_delay] / tick);
     self->delay_at = (self->delay_at + 1) % DELAY_SIZE;
     self->delay[self->delay_at] = (Measurement){
-        y - base + vars[V_com_bias] + self->estimate_v / w + self->dcm_noise, y - base, x[X_ROLL], x[X_RATE]};
+        y - base + vars[V_com_bias] + self->estimate_v / w + self->dcm_noise, y - base, x[X_ROLL], x[X_RATE], foot_v};
     Measurement m = self->delay[(self->delay_at + DELAY_SIZE - CLIP(behind, 0, DELAY_SIZE - 1)) % DELAY_SIZE];
     double kd = vars[V_dcm_gain] * (1.0 + vars[V_lock_gain] * lock), wanted = r.cop + (1.0 + kd / w) * (m.xi - r.dcm);
     double usable = vars[V_sole_usable] + lock * (vars[V_lock_sole] - vars[V_sole_usable]);
     double low = (right ? -a : a) - usable, high = (left ? a : -a) + usable;
     self->cop_command = CLIP(wanted, low, high);
-    double torque = -vars[V_hip_gain] * WEIGHT * (wanted - self->cop_command);
-    torque -= vars[V_posture_stiffness] * m.roll + vars[V_posture_damping] * (1.0 + 0.5 * compliance) * m.rate;
+    /* compliance: while a foot slides, yield: the CoP goes under the CoM as far as the sole allows, and friction gets a rest */
+    double full = vars[V_sole_half_width] - 0.003, sliding = CLIP(fabs(m.foot_v) / vars[V_yield_speed] - 0.5, 0.0, 1.0);
+    double yielding = CLIP(m.y, (right ? -a : a) - full, (left ? a : -a) + full);
+    self->cop_command += compliance * sliding * (yielding - self->cop_command);
+    double torque = -vars[V_hip_gain] * WEIGHT * (wanted - CLIP(wanted, low, high));
+    torque -= vars[V_posture_stiffness] * m.roll + vars[V_posture_damping] * (1.0 + vars[V_yield_damping] * compliance) * m.rate;
     double limit = vars[V_hip_torque] * (1.0 + vars[V_lock_torque] * lock);
     self->torque_command = CLIP(torque, -limit, limit);
 }

@@ -29,7 +29,7 @@ enum { S_Q = 0, S_V = TALOS_NQ, S_IMU = S_V + TALOS_NV, S_WRENCH = S_IMU + IMU_S
        S_TIME = S_HUMAN + HUMAN_SIZE, S_SIZE };
 
 typedef struct { double start, span, z0, v0, a0, z1; } Lift; /* quintic from (z0, v0, a0) to (z1, 0, 0) */
-typedef struct { double xi, y, roll, rate; } Measurement;
+typedef struct { double xi, y, roll, rate, foot_v; } Measurement;
 typedef struct { double cop, dcm, com; } Reference;
 
 /* What the contacts do at one instant. */
