@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
-import pytest
 from balance_motion import Motion, smooth_step
 
 from foreshock.records import Sample
@@ -30,11 +29,3 @@ class TestBalance(DetectorConformance):
         )
         instants = list(motion.samples(4.5, 0.005))
         return [s for samples in instants for s in samples.values()]
-
-    def test_lost_input_is_never_absence(self, lost_input: str, loss: str, request: pytest.FixtureRequest) -> None:
-        """As inherited; one gap of the detector is known."""
-        if lost_input == "plan":
-            # without the plan the CoM is judged against its running mean with a wider threshold
-            why = "a com-lateral-deviation that is present against the plan is cleared when the plan is lost"
-            request.applymarker(pytest.mark.xfail(raises=AssertionError, reason=why))
-        super().test_lost_input_is_never_absence(lost_input, loss)

@@ -262,7 +262,7 @@ def test_one_missing_frame_is_not_a_departure(build):
 
 
 def test_of_a_man_just_found_near_narrowing_is_not_known_yet(build):
-    """He appears at 0.6 s, 1.2 m away, without a velocity: absence is not claimed until the slope is known, 0.3 s later."""
+    """He appears at 0.6 s, 1.2 m away, velocity unknown: no absence is claimed until his slope is, 0.3 s later."""
     detector = build()
     answers = play(detector, Scene(lambda t: None if t < 0.6 else (1.2, 0.0), measured=False).samples(1.2))
     silent = [t for t, said in answers if not any(i.kind == NARROWING for i in said)]

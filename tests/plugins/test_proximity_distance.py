@@ -1,4 +1,4 @@
-"""Distances: closed form, python-fcl and coal agree, the closest pair is the closest, and points move as they should."""
+"""Distances: closed form, python-fcl and coal agree, the closest pair is the closest, and points move as they must."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from foreshock_detectors.proximity import _pair
 from foreshock_detectors.proximity._closed_form import segment_distance_m
 from foreshock_detectors.proximity._config import ProximityConfig
 from foreshock_detectors.proximity._kinematics import CapsuleKinematics
-from foreshock_detectors.proximity._nearest import approach_speeds
+from foreshock_detectors.proximity._nearest import NearestPairs, approach_speeds
 from foreshock_detectors.proximity._pair import PlacedCapsule, checked_distance_m
 from foreshock_detectors.proximity._people import People
 from foreshock_detectors.proximity._robot import Robot
-from foreshock_detectors.proximity._scene import Scene
+from foreshock_detectors.proximity._scene import ClosestPair, Scene
 
 points = st.tuples(*[st.floats(-2.0, 2.0).map(lambda x: round(x, 3))] * 3)  # whole mm: parallel and touching ones too
 segments = st.tuples(points, points)
@@ -154,6 +154,22 @@ def test_the_closest_pair_of_random_scenes_by_brute_force(robot, far_m):
     assert max(gaps) > 0.3
 
 
+def test_a_pair_that_is_not_the_closest_is_found_out(robot, monkeypatch):
+    """The search is made to answer capsules 0 and 0 always; within 280 updates the turn comes to a closer pair."""
+    rng, body, people = np.random.default_rng(10), CapsuleKinematics(robot), People(ProximityConfig())
+    q, _, joints, pose = random_state(robot, rng)
+    body.evaluate(joints, pose, 0)
+    people.take(0, Humans((person(rng, q[:3] + (1.5, 0.0, 0.0)),)))
+    honest = NearestPairs(ProximityConfig(), robot)
+    for _ in range(280):
+        honest.evaluate(body, 0.0, people, 0)
+    monkeypatch.setattr(Scene, "closest", lambda *_: ClosestPair(0, 0, np.zeros(3)))
+    misled = NearestPairs(ProximityConfig(), robot)
+    with pytest.raises(ValueError, match="the closest are said to be"):
+        for _ in range(280):
+            misled.evaluate(body, 0.0, people, 0)
+
+
 def test_joints_beyond_their_range_widen_the_merged_capsule(robot):
     """The gripper, opened 0.3 rad further than its limit, is still inside the hand's capsule."""
     body = CapsuleKinematics(robot)
@@ -182,7 +198,8 @@ def test_approach_speed_of_a_capsule_against_the_derivative_of_its_distance():
             a, b, c = (tuple(p) for p in (*(ends + t * velocity).tolist(), at.tolist()))
             return segment_distance_m(a, b, c, c)
 
-        (found,) = approach_speeds(ends[None], np.array([[velocity, velocity]]), point)
+        length2 = ((ends[1] - ends[0]) ** 2).sum(keepdims=True)
+        (found,) = approach_speeds(ends[None], np.array([[velocity, velocity]]), length2, point)
         assert found == pytest.approx((distance(-h) - distance(h)) / (2 * h), abs=1e-6)
 
 

@@ -55,6 +55,7 @@ class BalanceDetector:
         self._stability = Stability(config, self._robot.mass_kg)
         self._torso = TorsoRate(config)
         self._disagreement: list[float] | None = None
+        self._planned = False
         self._sway = Hysteresis(config.release_ratio)
         least_m, least_rad = config.sway_com_nominal_m, config.sway_roll_nominal_rad
         # a tenth of the nominal amplitude turns a half swing round: above the noise, far below what is judged
@@ -97,6 +98,7 @@ class BalanceDetector:
         planned_m = _value(plan).com[1] if plan is not None else math.nan
         if plan is not None and math.isfinite(planned_m):
             refs.append(plan)
+            self._planned = True
         else:
             planned_m = None
         self._com.update(body, planned_m, self._com_nominal.value)
@@ -104,7 +106,9 @@ class BalanceDetector:
         self._cross_check(imu, dt_s)
         self._slip_answer = self._slip_indications(body, joints, odometry, wrenches)
         evidence, newest_ns = _evidence(refs)
-        self._body_answer = [self._com_indication(evidence, newest_ns)]
+        # a plan that is lost widens the threshold: what is below it then says nothing, and is not reported
+        speaks = planned_m is not None or not self._planned or self._com.present
+        self._body_answer = [self._com_indication(evidence, newest_ns)] if speaks else []
         sway = self._sway_indication(body, planned_m, evidence, newest_ns)
         if sway is not None:
             self._body_answer.append(sway)

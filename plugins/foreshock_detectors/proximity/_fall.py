@@ -37,22 +37,19 @@ class Topple:
     """
 
     def __init__(self, ends: Array, radius: Array, support_m: float) -> None:
-        self._ends, self._radius = ends, radius[:, None]
-        z = ends[:, :, 2]
+        self._ends = ends.reshape(-1, 3)
+        self._radius = radius.repeat(2)
+        z = self._ends[:, 2]
         low = z - self._radius
         ground = low.min()
         self._height = z - ground
         self._support = low <= ground + support_m
 
-    def edge_m(self, u: Vec3) -> float:
-        """Where the support ends in the horizontal direction u: e in m from the origin."""
-        return self._reaches(u)[0]
+    def reaches_m(self, u: Array) -> tuple[float, float]:
+        """(e, rho) of a fall in the horizontal direction u, shape (3,).
 
-    def reach_m(self, u: Vec3) -> float:
-        """Rho (m): how far beyond the edge a fall in the direction u reaches."""
-        return self._reaches(u)[1]
-
-    def _reaches(self, u: Vec3) -> tuple[float, float]:
+        e: where the support ends (m), from the origin of the robot's ends; rho: how far beyond it a fall reaches (m).
+        """
         x = self._ends @ u
         edge_m = float((x + self._radius)[self._support].max())
         x -= edge_m
@@ -66,11 +63,12 @@ class Topple:
         Args:
             centre: his (m), in the frame of the robot's ends; the direction of the fall is from its origin to there.
             ends: both ends of each of his capsules relative to his centre, shape (k, 2, 3), m.
-            radius: shape (k,), m.
+            radius: of each end, shape (2 k,), m.
         """
-        away = math.hypot(centre[0], centre[1])
+        x, y, _ = centre
+        away = math.hypot(x, y)
         # where he stands in the robot itself, any direction will do
-        u = (centre[0] / away, centre[1] / away, 0.0) if away > 1e-6 else (1.0, 0.0, 0.0)
-        edge_m, reach_m = self._reaches(u)
-        nearest_m = float((ends @ u - radius[:, None]).min()) + centre[0] * u[0] + centre[1] * u[1]
+        u = np.array((x / away, y / away, 0.0) if away > 1e-6 else (1.0, 0.0, 0.0))
+        edge_m, reach_m = self.reaches_m(u)
+        nearest_m = float((ends.reshape(-1, 3) @ u - radius).min()) + (away if away > 1e-6 else x)
         return nearest_m - edge_m - reach_m

@@ -33,6 +33,7 @@ class CapsuleKinematics:
         q: configuration with the base's position at 0, shape (nq,).
         ends: both ends of each segment, shape (n, 2, 3), m.
         velocities: theirs, shape (n, 2, 3), m/s.
+        length2: squared length of each segment, shape (n,), m^2; 1e-30 for a ball.
         radius: shape (n,), m; grows where a merged joint is beyond the range that its capsule covers.
         speed: by how much points inside may be faster than the capsule, from merged joints, shape (n,), m/s.
     """
@@ -53,6 +54,8 @@ class CapsuleKinematics:
         for k in range(n):
             self._twist[k, :3, :3] = self._twist[k, 3:, :3] = np.eye(3)
             self._twist[k, :3, 3:], self._twist[k, 3:, 3:] = -pin.skew(a[k]), -pin.skew(b[k])
+        # a ball has no direction, and every product with its length is 0, so that any divisor will do
+        self.length2: Array = np.maximum(((b - a) ** 2).sum(axis=1), 1e-30)
         self._fitted = np.array([c.radius for c in capsules])
         self._swept(robot)
         self.origin: Vec3 = (0.0, 0.0, 0.0)

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 
 from foreshock.clock import NS_PER_S
+from foreshock_detectors.proximity._closed_form import segment_distance_m
 from foreshock_detectors.proximity._config import ProximityConfig
 from foreshock_detectors.proximity._fall import Topple
 from foreshock_detectors.proximity._kinematics import Array, CapsuleKinematics
@@ -39,12 +40,15 @@ class Nearest(msgspec.Struct, frozen=True, gc=False):
 class NearestPairs:
     """coal finds the closest pair, python-fcl measures it, the closed form checks that.
 
+    Each time one other pair, by turns, is checked not to be closer, so that all pairs of one human are within n k updates.
+
     v_r is not that of the closest part alone: a faster part behind it may arrive first.
     """
 
     def __init__(self, config: ProximityConfig, robot: Robot) -> None:
         self._config, self._robot = config, robot
         self._scenes: dict[str, Scene] = {}
+        self._turn = 0
 
     def evaluate(self, body: CapsuleKinematics, body_age_s: float, people: People, now_ns: int) -> list[Nearest]:
         """One record per person who is there, at now_ns.
@@ -59,21 +63,25 @@ class NearestPairs:
             ValueError: a distance fails its check.
         """
         config, present = self._config, people.present
+        self._turn += 1
         if len(self._scenes) > len(present):
             self._scenes = {p.id: self._scenes[p.id] for p in present if p.id in self._scenes}
         topple = Topple(body.ends, body.radius, config.fall_support_m) if present and config.fall_reach else None
         found = []
         for person in present:
             centre = people.centre(person, now_ns, body.origin)
+            there = np.array(centre)
             i, j, point = self._scene(person).closest(body, centre)
             distance_m = checked_distance_m(
-                _placed(body.ends[i], body.radius[i]),
-                _placed(person.ends[j] + centre, person.radius[j]),
+                _placed(body.ends[i], body.radius.item(i)),
+                _placed(person.ends[j] + there, person.radius.item(j)),
                 config.consistency_m,
             )
-            speeds = approach_speeds(body.ends, body.velocities, point + centre)
+            self._audit(body, person, there, distance_m)
+            speeds = approach_speeds(body.ends, body.velocities, body.length2, point + there)
             speeds += body.speed
             robot_speed_m_s = float(speeds.max())
+            clearance_m = None if topple is None else topple.clearance_m(centre, person.ends, person.end_radius)
             separation = protective_separation(
                 config,
                 distance_m=distance_m,
@@ -82,10 +90,21 @@ class NearestPairs:
                 robot_speed_m_s=robot_speed_m_s,
                 robot_age_s=body_age_s,
                 uncertainty_m=person.uncertainty_m,
-                fall_clearance_m=None if topple is None else topple.clearance_m(centre, person.ends, person.radius),
+                fall_clearance_m=clearance_m,
             )
             found.append(Nearest(distance_m, float(speeds[i]), robot_speed_m_s, separation))
         return found
+
+    def _audit(self, body: CapsuleKinematics, person: Person, there: Array, distance_m: float) -> None:
+        """Refuse the closest pair if the pair whose turn it is is closer."""
+        k = len(person.radius)
+        i, j = divmod(self._turn % (len(body.radius) * k), k)
+        (a, b), (c, d) = body.ends[i].tolist(), (person.ends[j] + there).tolist()
+        other_m = segment_distance_m(a, b, c, d) - body.radius.item(i) - person.radius.item(j)
+        if not other_m >= distance_m - self._config.consistency_m:
+            raise ValueError(
+                f"capsules {i} and {j} are {other_m:.6f} m apart, the closest are said to be {distance_m:.6f} m"
+            )
 
     def _scene(self, person: Person) -> Scene:
         scene = self._scenes.get(person.id)
@@ -95,19 +114,20 @@ class NearestPairs:
         return scene
 
 
-def approach_speeds(ends: Array, velocities: Array, point: Array) -> Array:
+def approach_speeds(ends: Array, velocities: Array, length2: Array, point: Array) -> Array:
     """Greatest speed (m/s) of each of n capsules' axes along the line from its closest point to a point; shape (n,).
 
     Args:
         ends: both ends of each, shape (n, 2, 3), m.
         velocities: theirs, shape (n, 2, 3), m/s. In between they are linear, so that the greatest is at an end.
+        length2: squared length of each, shape (n,), m^2, above 0.
         point: shape (3,), m.
     """
     start = ends[:, 0]
     along = ends[:, 1] - start
     rest = point - start
-    # a ball has no direction; its numerator is exactly 0
-    t = ((rest * along) @ _SUM) / np.maximum((along * along) @ _SUM, 1e-30)
+    t = (rest * along) @ _SUM
+    t /= length2
     np.minimum(np.maximum(t, 0.0, out=t), 1.0, out=t)
     rest -= along * t[:, None]
     distance = np.sqrt((rest * rest) @ _SUM)
@@ -119,4 +139,4 @@ def approach_speeds(ends: Array, velocities: Array, point: Array) -> Array:
 
 def _placed(ends: Array, radius: float) -> PlacedCapsule:
     a, b = ends.tolist()
-    return PlacedCapsule(tuple(a), tuple(b), float(radius))
+    return PlacedCapsule(a, b, radius)

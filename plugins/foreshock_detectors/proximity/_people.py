@@ -23,6 +23,7 @@ class Person(msgspec.Struct, frozen=True):
         stamp_ns: when he was measured.
         ends: both ends of each of his k capsules relative to his centre, shape (k, 2, 3), m.
         radius: shape (k,), m.
+        end_radius: the same for each end, shape (2 k,), m.
         centre: mean of the ends, in odom (m).
         velocity: of his trunk (m/s), None if it is not measured.
         speed_m_s: its magnitude.
@@ -33,6 +34,7 @@ class Person(msgspec.Struct, frozen=True):
     stamp_ns: int
     ends: Array
     radius: Array
+    end_radius: Array
     centre: Vec3
     velocity: Vec3 | None
     speed_m_s: float | None
@@ -115,4 +117,6 @@ def _person(pose: HumanPose, stamp_ns: int) -> Person:
     x, y, z = centre.tolist()
     speed = None if velocity is None else math.hypot(*velocity)
     radius = np.array([c.radius for c in pose.capsules])
-    return Person(pose.id, stamp_ns, ends - centre, radius, (x, y, z), velocity, speed, pose.uncertainty)
+    return Person(
+        pose.id, stamp_ns, ends - centre, radius, radius.repeat(2), (x, y, z), velocity, speed, pose.uncertainty
+    )

@@ -9,7 +9,7 @@ import click
 from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
 
-#from foreshock.cli.detectors_cmd import detectors
+from foreshock.cli.detectors_cmd import detectors
 from foreshock.cli.output import BAD_INPUT, FAILED, OK, emit, notes
 from foreshock.cli.scenarios_cmd import scenarios
 from foreshock.cli.simulate_cmd import simulate
@@ -42,7 +42,7 @@ def cli() -> None:
     """
 
 
-for command in (config, demo,  scenarios, simulate, taxonomy):
+for command in (config, demo, detectors, scenarios, simulate, taxonomy):
     cli.add_command(command)
 
 

@@ -35,7 +35,8 @@ static void publish(Plant *self, double *vars) {
     sensors_publish(self, vars, t);
     long long number = (long long)floor(t / period + 1e-6);
     double half_sign = (number % 2 == 0 ? 1.0 : -1.0) * sign * self->gait_amplitude;
-    Reference r = gait_reference(w, TALOS_HALF_STANCE - vars[V_cop_inset], single, vars[V_double_support], t - (double)number * period);
+    const double u = t - (double)number * period, rest = TALOS_HALF_STANCE - vars[V_cop_inset];
+    Reference r = gait_reference(w, rest, single, vars[V_double_support], u);
     vars[V_com_ref_x] = 0.0056868;
     vars[V_com_ref_y] = half_sign * r.com;
     vars[V_com_ref_z] = TALOS_COM_HEIGHT;
@@ -73,7 +74,7 @@ static void publish(Plant *self, double *vars) {
 
 int plant_init(Plant *self, double *vars) {
     memset(self, 0, sizeof *self);
-    for (int i = 0; i < N_VARS; i++)
+    for (int i = 0; i < V_sensor_time; i++) /* parameters and inputs come first */
         if (!isfinite(vars[i])) return fail(self, PLANT_ERROR, "a parameter or input is not finite", 0.0);
     if (!(vars[V_dt] > 0.0 && vars[V_dt] <= 0.002) || steps_in(vars, TICK) < 0)
         return fail(self, PLANT_ERROR, "dt = %g s; expected 0.002 s or a whole fraction of it", vars[V_dt]);
@@ -82,7 +83,8 @@ int plant_init(Plant *self, double *vars) {
     if (steps_in(vars, vars[V_sensor_period]) < 0)
         return fail(self, PLANT_ERROR, "sensor_period = %g s; expected a multiple of dt", vars[V_sensor_period]);
     if (steps_in(vars, vars[V_single_support]) < 0 || steps_in(vars, vars[V_double_support]) < 0)
-        return fail(self, PLANT_ERROR, "single_support, double_support = %g s, ...; expected multiples of dt", vars[V_single_support]);
+        return fail(self, PLANT_ERROR, "single_support = %g s, or double_support; expected multiples of dt",
+                    vars[V_single_support]);
     if (vars[V_latency] > vars[V_sensor_period] * (RING_SIZE - 1))
         return fail(self, PLANT_ERROR, "latency = %g s; expected less than 63 sensor periods", vars[V_latency]);
     if (vars[V_delay] > TICK * (DELAY_SIZE - 1))
@@ -167,11 +169,14 @@ int plant_step(Plant *self, double *vars, double t, double h) {
     self->message[0] = 0;
     const long long n = steps_in(vars, h);
     if (n < 0) return fail(self, PLANT_DISCARD, "communication step %g s is no multiple of dt", h);
-    if (fabs(t - now(self, vars)) > 0.5 * vars[V_dt]) return fail(self, PLANT_DISCARD, "asked to step from %g s, which is not the plant's time", t);
+    if (fabs(t - now(self, vars)) > 0.5 * vars[V_dt])
+        return fail(self, PLANT_DISCARD, "asked to step from %g s, which is not the plant's time", t);
     for (int i = V_step_suppression; i <= V_impact_mitigation; i++)
-        if (!(vars[i] >= 0.0 && vars[i] <= 1.0)) return fail(self, PLANT_ERROR, "an intervention is %g; expected 0 to 1", vars[i]);
+        if (!(vars[i] >= 0.0 && vars[i] <= 1.0))
+            return fail(self, PLANT_ERROR, "an intervention is %g; expected 0 to 1", vars[i]);
     for (long long i = 0; i < n; i++) advance(self, vars);
     publish(self, vars);
-    if (!isfinite(self->x[X_Y]) || !isfinite(self->x[X_ROLL])) return fail(self, PLANT_ERROR, "the state is not finite at %g s", t + h);
+    if (!isfinite(self->x[X_Y]) || !isfinite(self->x[X_ROLL]))
+        return fail(self, PLANT_ERROR, "the state is not finite at %g s", t + h);
     return PLANT_OK;
 }

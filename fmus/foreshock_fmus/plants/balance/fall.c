@@ -39,7 +39,8 @@ void fall_start(Plant *self, const double *vars, double t) {
     c[C_LIFT_RIGHT] = lift_height(&self->lift[1], t, &rate, &acceleration);
     talos_standing(c, self->fall_q);
     double psi = -side * x[X_ROLL], psi_rate = -side * x[X_RATE], moment = UPPER_MASS * UPPER_LEVER;
-    double line_y = TALOS_MASS * side * (y - edge) - moment * sin(psi), line_z = TALOS_MASS * TALOS_COM_HEIGHT - moment * cos(psi);
+    double line_y = TALOS_MASS * side * (y - edge) - moment * sin(psi);
+    double line_z = TALOS_MASS * TALOS_COM_HEIGHT - moment * cos(psi);
     double alpha = atan2(line_y, line_z), length = sqrt(line_y * line_y + line_z * line_z) / LINE_MASS;
     double vy = TALOS_MASS * side * v - moment * psi_rate * cos(psi), vz = moment * psi_rate * sin(psi);
     double *f = self->fall;
@@ -56,7 +57,8 @@ void fall_start(Plant *self, const double *vars, double t) {
 }
 
 void fall_rhs(const Plant *self, const double *vars, const double f[T_SIZE], double df[T_SIZE], Contact *contact) {
-    const double alpha = f[T_TURN], psi = f[T_ROLL], l = f[T_LENGTH], wa = f[T_TURN_RATE], wp = f[T_ROLL_RATE], vl = f[T_LENGTH_RATE];
+    const double alpha = f[T_TURN], psi = f[T_ROLL], l = f[T_LENGTH];
+    const double wa = f[T_TURN_RATE], wp = f[T_ROLL_RATE], vl = f[T_LENGTH_RATE];
     const double sa = sin(alpha), ca = cos(alpha), sp = sin(psi), cp = cos(psi), sd = sin(alpha - psi), cd = cos(alpha - psi);
     const double give = self->act[ACT_MITIGATION], moment = UPPER_MASS * UPPER_LEVER;
     /* contact of the upper arm with the human's chest, horizontal */
@@ -79,7 +81,8 @@ void fall_rhs(const Plant *self, const double *vars, const double f[T_SIZE], dou
     double shorter = self->fall_length - l, stiff = vars[V_leg_stiffness] * shorter - vars[V_leg_damping] * vl;
     const double knees = give * vars[V_knee_give];
     double leg = (1.0 - knees) * (stiff + LINE_MASS * GRAVITY * cos(self->fall_start)) - knees * vars[V_knee_damping] * vl;
-    if (l < SHORTEST * self->fall_length) leg += vars[V_leg_stiffness] * (SHORTEST * self->fall_length - l) - vars[V_leg_damping] * vl;
+    const double shortest = SHORTEST * self->fall_length;
+    if (l < shortest) leg += vars[V_leg_stiffness] * (shortest - l) - vars[V_leg_damping] * vl;
     const double mm = LEGS_MASS * LEGS_CENTRE * LEGS_CENTRE + UPPER_MASS;
     double qa = LINE_MASS * GRAVITY * l * sa - hip - force * l * ca - 2.0 * mm * l * vl * wa - moment * l * wp * wp * sd;
     double qp = moment * GRAVITY * sp + hip - force * (zc * cp - b * sp) - moment * (2.0 * vl * wa * cd - l * wa * wa * sd);

@@ -37,10 +37,16 @@ static int motion(const Plant *self, const double *vars, double t, double *c, do
     double df[T_SIZE], side = self->fall_side;
     const double *f = self->fall;
     fall_rhs(self, vars, f, df, contact);
-    if (self->stage == STAGE_DOWN) memset(df, 0, sizeof df), *contact = (Contact){.cop = self->fall_edge, .low = self->fall_edge, .high = self->fall_edge};
-    c[F_TURN] = -side * (f[T_TURN] - self->fall_start), c[F_ROLL] = -side * f[T_ROLL], c[F_LENGTH] = f[T_LENGTH] / self->fall_length;
-    v[F_TURN] = -side * f[T_TURN_RATE], v[F_ROLL] = -side * f[T_ROLL_RATE], v[F_LENGTH] = f[T_LENGTH_RATE] / self->fall_length;
-    a[F_TURN] = -side * df[T_TURN_RATE], a[F_ROLL] = -side * df[T_ROLL_RATE], a[F_LENGTH] = df[T_LENGTH_RATE] / self->fall_length;
+    if (self->stage == STAGE_DOWN) {
+        memset(df, 0, sizeof df);
+        *contact = (Contact){.cop = self->fall_edge, .low = self->fall_edge, .high = self->fall_edge};
+    }
+    c[F_TURN] = -side * (f[T_TURN] - self->fall_start), c[F_ROLL] = -side * f[T_ROLL];
+    c[F_LENGTH] = f[T_LENGTH] / self->fall_length;
+    v[F_TURN] = -side * f[T_TURN_RATE], v[F_ROLL] = -side * f[T_ROLL_RATE];
+    v[F_LENGTH] = f[T_LENGTH_RATE] / self->fall_length;
+    a[F_TURN] = -side * df[T_TURN_RATE], a[F_ROLL] = -side * df[T_ROLL_RATE];
+    a[F_LENGTH] = df[T_LENGTH_RATE] / self->fall_length;
     c[F_ARM_LEFT] = x[X_AL], c[F_ARM_RIGHT] = x[X_AR];
     v[F_ARM_LEFT] = v[F_ARM_RIGHT] = a[F_ARM_LEFT] = a[F_ARM_RIGHT] = 0.0;
     return F_SIZE;
