@@ -40,7 +40,7 @@ class Nearest(msgspec.Struct, frozen=True, gc=False):
 class NearestPairs:
     """coal finds the closest pair, python-fcl measures it, the closed form checks that.
 
-    Each time one other pair, by turns, is checked not to be closer, so that all pairs of one human are within n k updates.
+    Each time one other pair, by turns, is checked not to be closer: in n k updates all n k pairs of a human.
 
     v_r is not that of the closest part alone: a faster part behind it may arrive first.
     """

@@ -6,7 +6,6 @@ import math
 from typing import Any, NamedTuple
 
 import fcl
-import numpy as np
 
 from foreshock.messages import Vec3
 from foreshock_detectors.proximity._closed_form import segment_distance_m
@@ -52,6 +51,6 @@ def _object(capsule: PlacedCapsule) -> Any:
         dx, dy, dz = -dx, -dy, -dz
     w, x, y = (length + dz, -dy, dx) if length > 0.0 else (1.0, 0.0, 0.0)
     norm = math.sqrt(w * w + x * x + y * y)
-    turn = np.array((w / norm, x / norm, y / norm, 0.0))
-    centre = np.array((0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)))
+    turn = (w / norm, x / norm, y / norm, 0.0)
+    centre = (0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz))
     return fcl.CollisionObject(fcl.Capsule(radius, length), fcl.Transform(turn, centre))

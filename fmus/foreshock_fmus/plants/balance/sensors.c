@@ -108,7 +108,10 @@ void sensors_sample(Plant *self, const double *vars, double t) {
     wrench(w + 6, contact.force_right, (1.0 - share) * load, com[0] - sole_x, off[1]);
     for (int i = 0; i < WRENCH_SIZE; i++) w[i] = noisy(self, w[i], vars[i % 6 < 3 ? V_force_noise : V_torque_noise]);
     double place = vars[V_human_place_y], speed = 0.0;
-    if (self->stage != STAGE_STANDING) place = self->fall_side * self->fall[T_HUMAN], speed = self->fall_side * self->fall[T_HUMAN_RATE];
+    if (self->stage != STAGE_STANDING) {
+        place = self->fall_side * self->fall[T_HUMAN];
+        speed = self->fall_side * self->fall[T_HUMAN_RATE];
+    }
     s[S_HUMAN] = noisy(self, vars[V_human_place_x], vars[V_human_noise]);
     s[S_HUMAN + 1] = noisy(self, place, vars[V_human_noise]);
     s[S_HUMAN + 2] = noisy(self, speed, 2.0 * vars[V_human_noise]);
