@@ -35,18 +35,26 @@ NOTES = (
     "of mass are found by the detectors in noisy sensor streams; nothing of the cascade is scripted.",
     "P is Eq. 1 of the paper on the precursors tied to A1, and T = 1 − P. The paper's gate acts at T < 0.3, which waits "
     "for the third precursor; the ladder suppresses the next step at a caution gate of T < 0.6 and takes all four "
-    "protocols at T < 0.3.",
+    "protocols at T < 0.3. Plant, thresholds and gates were chosen on seeds below 10000; all figures here are on seeds "
+    "from 10000 on.",
 )
+
+
+FIRST_SEED = 10_000
+"""Plant, thresholds and gates were chosen on seeds below; what is reported is on seeds from here."""
 
 
 def cells(seeds: int, per_cell: int) -> list[Cell]:
     """The sweep: the default point on all seeds, severities on fewer."""
-    every = tuple(range(seeds))
+    every = tuple(range(FIRST_SEED, FIRST_SEED + seeds))
     some = every[:per_cell]
     points = [Cell("default", "default", {}, every)]
-    points += [Cell("friction", f"μ {v:g}", {"mu_low": v}, some) for v in (0.02, 0.045, 0.06, 0.075, 0.1)]
-    points += [Cell("duration", f"{v:g} s", {"slip_duration": v}, some) for v in (0.1, 0.2, 0.6, 1.2)]
-    points += [Cell("push", f"{v:g} N s", {"mu_low": 0.6, "push": v}, some) for v in (8.0, 16.0, 24.0, 40.0)]
+    points += [Cell("friction", f"μ {v:g}", {"drop_mu": v}, some) for v in (0.03, 0.048, 0.052, 0.06)]
+    points += [Cell("duration", f"{v:g} s", {"drop_duration": v}, some) for v in (0.1, 0.2, 0.3, 1.0)]
+    points += [
+        Cell("push, no ice", f"{v:g} N s", {"drop_duration": 0.0, "push_impulse": v}, some)
+        for v in (4.0, 8.0, 12.0, 30.0)
+    ]
     return points
 
 
@@ -58,7 +66,7 @@ def cells(seeds: int, per_cell: int) -> list[Cell]:
     show_default=True,
     help="Folder for report and pictures.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the three runs that are shown.")
+@click.option("--seed", type=int, default=FIRST_SEED, show_default=True, help="Of the three runs that are shown.")
 @click.option(
     "--seeds", type=click.IntRange(1), default=50, show_default=True, help="Runs per arm at default parameters."
 )
