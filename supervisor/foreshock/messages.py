@@ -188,12 +188,7 @@ _TOTAL: Mapping[type, Callable[[Any], float]] = {
         ]
     ),
     GripState: lambda m: (
-        m.normal_force
-        + m.tangential_force
-        + m.opening
-        + m.commanded_force
-        + m.object_mass
-        + m.vertical_acceleration
+        m.normal_force + m.tangential_force + m.opening + m.commanded_force + m.object_mass + m.vertical_acceleration
     ),
     Heartbeat: lambda m: m.round_trip_s,
     MotionPlan: lambda m: sum(m.com) + m.speed,

@@ -170,7 +170,8 @@ class Pipeline:
             for mode, t in trust.control_by_mode.items()
         }
         predicted = _predicted(state.predicted, observed, tracks, lost, now_ns)
-        soonest = min((max(0.0, t - (now_ns - at) / 1e9) for at, t in predicted.values()), default=None)
+        times = self._times(predicted, now_ns)
+        soonest = min(times.values(), default=None)
         by_mode = {mode: s.level for mode, s in levels.items()}
         arbiter = state.arbiter
         held: tuple[Intervention, ...] = ()
@@ -179,7 +180,7 @@ class Pipeline:
             # read-only: a policy is a plugin, and must not write into what the next tick starts from
             seen_levels, seen_trust = MappingProxyType(by_mode), MappingProxyType(trust.control_by_mode)
             situation = Situation(
-                now_ns, seen_levels, seen_trust, trust.control_trust, overall.level, precursors, soonest
+                now_ns, seen_levels, seen_trust, trust.control_trust, overall.level, precursors, soonest, times
             )
             proposals, fault = proposals_of(self._policies, situation, self._arbiter.actions)
             if fault:
@@ -228,6 +229,15 @@ class Pipeline:
             health,
         )
         return after, decision
+
+    def _times(self, predicted: Mapping[ev.Key, tuple[int, float]], now_ns: int) -> dict[str, float]:
+        """Shortest predicted time (s) from now per accident mode that one is predicted for."""
+        times: dict[str, float] = {}
+        for (kind, _, _), (at_ns, time_s) in predicted.items():
+            left_s = max(0.0, time_s - (now_ns - at_ns) / 1e9)
+            for mode in self._risk.modes_of(kind):
+                times[mode] = min(left_s, times.get(mode, left_s))
+        return times
 
     def _take(self, sample: Sample, now_ns: int) -> None:
         """Give a sample to those who read its channel; what is malformed is kept from them and marks the channel."""

@@ -78,7 +78,8 @@ class Situation(msgspec.Struct, frozen=True):
         overall: control-level trust overall.
         overall_level: protection level from overall trust and from lost evidence.
         precursors: evidence inside the window.
-        time_to_event_s: shortest predicted time to an accident, None if none is predicted.
+        time_to_event_s: shortest predicted time to any accident, None if none is predicted.
+        times: shortest predicted time per accident mode that one is predicted for; None where modes are not told apart.
     """
 
     now_ns: int
@@ -88,6 +89,11 @@ class Situation(msgspec.Struct, frozen=True):
     overall_level: ProtectionLevel
     precursors: Sequence[Precursor]
     time_to_event_s: float | None
+    times: Mapping[str, float] | None = None
+
+    def time_to(self, mode: str) -> float | None:
+        """Predicted time to an accident of this mode; ``""`` means of any."""
+        return self.time_to_event_s if self.times is None or not mode else self.times.get(mode)
 
 
 class Proposal(msgspec.Struct, frozen=True):
@@ -129,6 +135,8 @@ class ArbiterState(msgspec.Struct, frozen=True):
 
 
 UNCONDITIONAL = frozenset({"speed-scale", "minimal-risk"})
+MITIGATION_NS = 500_000_000
+"""A mitigation that has begun holds for so long: as long as the last part of a fall takes."""
 
 
 class Arbiter:
@@ -158,8 +166,9 @@ class Arbiter:
         An engaged action is kept. A mitigation stands only when nothing new can prevent the accident any more and no
         more time is left than the mitigation itself needs.
         """
+        committed = [p for p in proposals if self._committed(state, p.action, now_ns)]
         if time_to_event_s is None:
-            return [p for p in proposals if not self.actions[p.action].mitigates]
+            return [p for p in proposals if not self.actions[p.action].mitigates] + committed
         prevent = [p for p in proposals if not self.actions[p.action].mitigates]
         keep = [
             p
@@ -176,9 +185,17 @@ class Arbiter:
             keep += [
                 p
                 for p in proposals
-                if self.actions[p.action].mitigates and time_to_event_s <= self.actions[p.action].duration_s
+                if self.actions[p.action].mitigates
+                and p not in committed
+                and time_to_event_s <= self.actions[p.action].duration_s
             ]
-        return keep
+        return keep + committed
+
+    def _committed(self, state: ArbiterState, action: str, now_ns: int) -> bool:
+        """Whether a mitigation has begun so lately that it is not given up: a prediction at its edge flickers."""
+        since = state.engaged_ns.get(action)
+        begun = since is not None and action not in state.releasing and now_ns - since < MITIGATION_NS
+        return begun and self.actions[action].mitigates
 
     def choose(self, proposals: Sequence[Proposal], present: frozenset[str]) -> list[Proposal]:
         """One proposal per resource: mitigation, then level, then not worsening a present kind, then strength, id.
@@ -213,7 +230,11 @@ class Arbiter:
         now = situation.now_ns
         present = frozenset(p.kind for p in situation.precursors if p.phase != "cleared")
         wanted = [p for p in proposals if p.strength > 0.0]
-        feasible = self.feasible(state, wanted, now, situation.time_to_event_s)
+        feasible = [
+            p
+            for mode in dict.fromkeys(p.mode for p in wanted)
+            for p in self.feasible(state, [p for p in wanted if p.mode == mode], now, situation.time_to(mode))
+        ]
         seen = tuple(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in situation.precursors)
         active: dict[str, Intervention] = {}
         engaged: dict[str, int] = {}

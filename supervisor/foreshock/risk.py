@@ -77,6 +77,10 @@ class IndependentRisk:
             dict.fromkeys(taxonomy.codes, (0.0, 0.0)),
         )
 
+    def modes_of(self, kind: str) -> Sequence[str]:
+        """Accident modes that a kind counts for."""
+        return self._modes[kind]
+
     def estimate(self, precursors: Sequence[Precursor]) -> RiskEstimate:
         """The risk of these precursors; each (kind, subject) is one of them."""
         if not precursors:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from statistics import median
 
 import click
 import msgspec
@@ -131,23 +132,25 @@ def _three(scenario: Scenario, seed: int) -> list[tuple[str, Run]]:
 
 
 def _print_sweep(results: list[CellResult]) -> None:
+    """One row per severity: how many fell under each arm, and what the supervisor did otherwise."""
+    arms = [a.label for a in ARMS]
     rows = []
-    for r in results:
-        lead = sorted(r.lead_s)
+    for k in range(0, len(results), len(arms)):
+        mine = results[k : k + len(arms)]
+        cell = mine[0].cell
+        acting = mine[1:]
         rows.append(
             (
-                r.cell.factor,
-                r.cell.label,
-                r.arm,
-                str(r.falls),
-                str(r.accidents),
-                str(r.prevented),
-                str(r.caused),
-                str(r.false_interventions),
-                f"{lead[len(lead) // 2]:.2f}" if lead else "–",
+                cell.label if cell.factor == cell.label else f"{cell.factor} {cell.label}",
+                *(str(r.falls) for r in mine),
+                " / ".join(str(r.caused) for r in acting),
+                " / ".join(f"{r.false_interventions.k} of {r.false_interventions.n}" for r in acting),
+                " / ".join(f"{median(r.lead_s):.2f}" if r.lead_s else "–" for r in acting),
             )
         )
-    right = ("fell", "onto human", "prevented", "caused", "false", "lead (s)")
-    table("Sweep (95% Wilson intervals; arms paired by seed)", "factor", "value", "arm", *right, rows=rows, right=right)
-    if any(r.failures for r in results):
-        console.print(f"[red]{sum(r.failures for r in results)} runs gave no result[/]")
+    falls = [f"fell: {a}" for a in arms]
+    columns = (*falls, "caused", "false", "lead (s)")
+    title = "Sweep: 95% Wilson intervals, arms paired by seed; caused, false and lead: paper's gate / ladder"
+    table(title, "severity", *columns, rows=rows, right=columns)
+    if failed := sum(r.failures for r in results):
+        console.print(f"[red]{failed} runs gave no result[/]")

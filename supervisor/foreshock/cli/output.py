@@ -6,6 +6,7 @@ Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a t
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -19,7 +20,7 @@ __all__ = ["BAD_INPUT", "FAILED", "NEGATIVE", "OK", "console", "emit", "notes", 
 OK, NEGATIVE, BAD_INPUT, FAILED = 0, 1, 2, 3
 SCHEMA = "foreshock/1"
 
-console = Console(highlight=False)
+console = Console(highlight=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else 120)
 """Results."""
 notes = Console(stderr=True, highlight=False)
 """Progress, hints and errors."""

@@ -25,7 +25,7 @@ class TimelineRow(msgspec.Struct, frozen=True):
         probability: P of the mode.
         trust: T of the mode.
         control_trust: control-level trust of the mode.
-        level: protection level overall.
+        level: protection level of the mode, or minimal risk.
         interventions: action and strength of what changed.
         events: what happened in the plant.
     """
@@ -64,7 +64,7 @@ class Run(msgspec.Struct, frozen=True):
         timeline: ticks at which something changed.
         series: columns over time, for plots; ``t_s`` is the first.
         digest: of all decisions, empty if not asked for.
-        max_level: highest protection level overall.
+        max_level: highest protection level of the mode, or minimal risk.
     """
 
     scenario: str

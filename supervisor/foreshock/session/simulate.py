@@ -147,8 +147,8 @@ class _Log:
         mode = self._mode
         self.interventions += d.changes
         self.health += d.health
-        self.max_level = max(self.max_level, d.level)
-        level = d.levels[mode]
+        level = d.level if d.level is ProtectionLevel.MINIMAL_RISK else d.levels[mode]
+        self.max_level = max(self.max_level, level)
         for gate in (ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE):
             if level >= gate and gate.name.lower() not in self.gate_s:
                 self.gate_s[gate.name.lower()] = t
@@ -161,12 +161,12 @@ class _Log:
         names = frozenset(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in mine)
         m, q = d.risk.counts[mode]
         changed = tuple(f"{i.action} {i.strength:.2f}" for i in d.changes if _worth_a_row(i))
-        state = (names, m, q, d.level)
+        state = (names, m, q, level)
         if state != self._before or changed or news:
             shown = tuple(sorted(n if n in self._known else f"+{n}" for n in names))
             trust, control = d.trust.by_mode[mode], d.trust.control_by_mode[mode]
             p_mode = d.risk.by_mode[mode]
-            self.rows.append(TimelineRow(t, shown, m, q, p_mode, trust, control, d.level.name.lower(), changed, news))
+            self.rows.append(TimelineRow(t, shown, m, q, p_mode, trust, control, level.name.lower(), changed, news))
         self._before, self._known = state, names
 
     def _sample(self, t: float, d: Decision | None, twin: Twin) -> None:
@@ -181,7 +181,7 @@ class _Log:
                 "p_overall": d.risk.probability,
                 "m": m,
                 "q": q,
-                "level": float(d.level),
+                "level": float(d.levels[mode]),
                 "time_to_event_s": math.nan if d.time_to_event_s is None else d.time_to_event_s,
             }
             for i in d.indications:

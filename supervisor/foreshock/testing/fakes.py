@@ -44,9 +44,7 @@ class ThresholdDetector:
         severity = min(1.0, statistic / c.threshold) if self._present else 0.0
         ref = SampleRef(sample.channel, sample.stamp_ns)
         return [
-            Indication(
-                self._kind, "", sample.stamp_ns, self._present, statistic, c.threshold, "1", severity, (ref,)
-            )
+            Indication(self._kind, "", sample.stamp_ns, self._present, statistic, c.threshold, "1", severity, (ref,))
         ]
 
 
