@@ -157,9 +157,7 @@ class Registry:
             if attr.startswith("foreshock_") and attr not in known and callable(getattr(module, attr)):
                 raise PluginError(f"plugin {name}", f"unknown hook {attr!r}", nearest(attr, known))
             if attr in known and not hasattr(getattr(module, attr), f"{GROUP}_impl"):
-                raise PluginError(
-                    f"plugin {name}", f"hook {attr!r} is not marked", "; put @foreshock.hookimpl above it"
-                )
+                raise PluginError(f"plugin {name}", f"hook {attr!r} lacks @hookimpl")
 
 
 def _pick(specs: Iterable[T], id_: str, place: str, what: str) -> T:

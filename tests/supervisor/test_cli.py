@@ -32,7 +32,7 @@ def foreshock(*words: str) -> subprocess.CompletedProcess[str]:
         (("simulate", "a1-fall-onto-humn"), "did you mean 'a1-fall-onto-human'"),
         (("simulate", "missing.toml"), "missing.toml"),
         (("simulate", "a1-fall-onto-human", "--set", "mu_low"), "is not NAME=NUMBER"),
-        (("simulate", "a1-fall-onto-human", "--set", "mu_lo=0.1"), "did you mean 'mu_low'"),
+        (("simulate", "a1-fall-onto-human", "--set", "drop_m=0.1"), "did you mean 'drop_mu'"),
         (("simulate", "a1-fall-onto-human", "--policy", "lader"), "did you mean 'ladder'"),
         (("simulate", "a1-fall-onto-human", "--twin", "fmu"), "did you mean 'fmi'"),
         (("simulate", "a1-fall-onto-human", "--supervisor", "onn"), "'on', 'shadow', 'off'"),
