@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from types import NoneType
 
 import msgspec
 
@@ -17,6 +16,8 @@ from foreshock._strict import within
 from foreshock.clock import ns
 from foreshock.detector import Detector, DetectorSpec, Input, Inputs
 from foreshock.errors import nearest
+from foreshock.evidence import Key
+from foreshock.messages import is_finite
 from foreshock.policy import ActionSpec, Policy, Proposal, Situation
 from foreshock.records import ChannelState, Indication, ProtectionLevel, Sample, SampleRef
 from foreshock.taxonomy import Taxonomy
@@ -51,8 +52,11 @@ def proposals_of(
                     raise ValueError(f"strength {p.strength} of {p.action} is not within 0..1")
                 if type(p.mode) is not str or type(p.rule) is not str:
                     raise TypeError(f"mode {p.mode!r} and rule {p.rule!r} of {p.action} must be str")
-                level = ProtectionLevel(p.level)
-                found.append(Proposal(str(p.action), float(p.strength), level, p.mode, p.rule))
+                if type(p.action) is str and type(p.strength) is float and type(p.level) is ProtectionLevel:
+                    found.append(p)
+                else:
+                    level = ProtectionLevel(p.level)
+                    found.append(Proposal(str(p.action), float(p.strength), level, p.mode, p.rule))
         except KeyboardInterrupt:
             raise
         except BaseException as e:  # noqa: BLE001 # containment, as below
@@ -68,55 +72,89 @@ class Outcome(msgspec.Struct, frozen=True):
         reason: why it is not ok.
         said: indications of this update; empty if it was not due or not ok.
         due: whether it was its turn.
-        missing: declared kinds that it left out although it is ok.
     """
 
     state: ChannelState
     reason: str = ""
-    said: tuple[Indication, ...] = ()
+    said: Mapping[Key, Indication] = {}
     due: bool = True
-    missing: frozenset[str] = frozenset()
+
+
+NOT_DUE = Outcome("ok", due=False)
 
 
 class ChannelView:
-    """Newest valid sample of a channel, whether one was malformed, and its arrivals within a second."""
+    """Newest valid sample of a channel, whether one was malformed, and its arrivals within a second.
 
-    __slots__ = ("arrivals", "fault", "fault_ns", "latest")
+    Args:
+        needs: the inputs that read this channel.
+        queues: where each of them waits for new samples.
+    """
 
-    def __init__(self) -> None:
+    __slots__ = ("_queues", "_rated", "_type", "_types", "arrivals", "fault", "fault_ns", "latest")
+
+    def __init__(self, needs: Sequence[Input], queues: Sequence[list[Sample]]) -> None:
+        self._types = tuple({need.type: None for need in needs})
+        self._type = self._types[0] if len(self._types) == 1 else None
+        self._rated = any(need.min_rate_hz > 0 for need in needs)
+        self._queues = tuple(queues)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was seen."""
         self.latest: Sample | None = None
         self.fault = ""
         self.fault_ns = -1
         self.arrivals: deque[int] = deque()
 
-    def judge(self, fault: str, now_ns: int) -> None:
-        """Note what is wrong with a sample that arrived, if anything.
+    def take(self, sample: Sample, now_ns: int) -> bool:
+        """Give a sample to those who read the channel, if it is valid; a malformed one marks the channel.
 
         A valid sample clears a fault of an earlier tick only: of two in one tick the malformed one is still a gap.
         """
+        stamp_ns, value = sample.stamp_ns, sample.value
+        sound = type(stamp_ns) is int and stamp_ns <= now_ns + AHEAD_NS and type(value) is self._type
+        fault = "" if sound and is_finite(value) else self._fault_of(sample, now_ns)
         if fault:
             self.fault, self.fault_ns = fault, now_ns
-        elif self.fault and self.fault_ns < now_ns:
+            return False
+        if self.fault and self.fault_ns < now_ns:
             self.fault = ""
+        if self.latest is None or stamp_ns >= self.latest.stamp_ns:
+            self.latest = sample
+        if self._rated:
+            self.arrivals.append(now_ns)
+        for queue in self._queues:
+            queue.append(sample)
+        return True
 
-    def state(self, need: Input, now_ns: int, since_ns: int) -> tuple[ChannelState, str]:
-        """Whether the channel serves this input now, and if not why."""
+    def _fault_of(self, sample: Sample, now_ns: int) -> str:
+        if type(sample.stamp_ns) is not int:
+            return f"{sample.channel} has the stamp {sample.stamp_ns!r}, an int of nanoseconds is expected"
+        for wanted in self._types:
+            if not isinstance(sample.value, wanted):
+                return f"{sample.channel} carries {type(sample.value).__name__}, {wanted.__name__} is expected"
+        if not is_finite(sample.value):
+            return f"{sample.channel} carries a number that is not finite"
+        if sample.stamp_ns > now_ns + AHEAD_NS:
+            return f"{sample.channel} is stamped {(sample.stamp_ns - now_ns) / 1e6:.0f} ms ahead of the supervisor"
+        return ""
+
+    def lacks(self, need: Input, max_age_ns: int, now_ns: int, since_ns: int) -> str:
+        """Why the channel does not serve this input now; empty if it does."""
         if self.fault:
-            return "failed", self.fault
+            return self.fault
         if self.latest is None:
-            return "stale", f"no {need.type.__name__} on {need.channel} since reset"
+            return f"no {need.type.__name__} on {need.channel} since reset"
         age = now_ns - self.latest.stamp_ns
-        if age > ns(need.max_age_s):
-            return (
-                "stale",
-                f"{need.channel} is {age / 1e6:.0f} ms old, at most {need.max_age_s * 1e3:.0f} ms is allowed",
-            )
+        if age > max_age_ns:
+            return f"{need.channel} is {age / 1e6:.0f} ms old, at most {need.max_age_s * 1e3:.0f} ms is allowed"
         if need.min_rate_hz > 0.0 and now_ns - since_ns >= 1_000_000_000:
             while self.arrivals and self.arrivals[0] <= now_ns - 1_000_000_000:
                 self.arrivals.popleft()
             if len(self.arrivals) < need.min_rate_hz:
-                return "late", f"{need.channel} has {len(self.arrivals)} samples/s, {need.min_rate_hz:g} are needed"
-        return "ok", ""
+                return f"{need.channel} has {len(self.arrivals)} samples/s, {need.min_rate_hz:g} are needed"
+        return ""
 
 
 class Contained:
@@ -147,7 +185,8 @@ class Contained:
         times |= {f"inputs.{i.name}.min_rate_hz": i.min_rate_hz for i in self.inputs}
         for name, value in times.items():
             within(f"detector {spec.id}: {name}", value, 0.0)
-        self._period_ns = ns(spec.period_s)
+        self._period_ns, self._warm_up_ns = ns(spec.period_s), ns(spec.warm_up_s)
+        self._needs = tuple((i, ns(i.max_age_s)) for i in self.inputs if i.channel != "*")
         self.pending: dict[str, list[Sample]] = {i.name: [] for i in self.inputs}
         self._start(0, 0)
 
@@ -183,32 +222,30 @@ class Contained:
             self._drop()
             return self._failed(verdict, now_ns)
         latest: dict[str, Sample] = {}
-        for need in self.inputs:
-            if need.channel == "*":
-                continue
+        for need, max_age_ns in self._needs:
             view = channels[need.channel]
-            state, reason = view.state(need, now_ns, self._began_ns)
-            if state == "ok":
-                assert view.latest is not None  # noqa: S101 # state() says so
+            reason = view.lacks(need, max_age_ns, now_ns, self._began_ns)
+            if not reason:
+                assert view.latest is not None  # noqa: S101 # lacks() says so
                 latest[need.name] = view.latest
             elif need.required:
                 self._drop()
                 return Outcome("unobserved", reason)
         if now_ns < self._due_ns:
-            return Outcome("ok", due=False)
+            return NOT_DUE
         self._due_ns = now_ns + self._period_ns
         new = {name: tuple(queue) for name, queue in self.pending.items()}
         self._drop()
         try:
             said = self.detector.update(now_ns, Inputs(latest, new))
-            checked, missing = self._checked(said, now_ns)
+            checked = self._checked(said, now_ns)
         except KeyboardInterrupt:
             raise
         except BaseException as e:  # noqa: BLE001 # containment, as above
             return self._failed(_said_by(e), now_ns)
-        if now_ns - self._began_ns < ns(self.spec.warm_up_s):
+        if now_ns - self._began_ns < self._warm_up_ns:
             return Outcome("warm-up", f"{self.spec.warm_up_s:g} s after reset")
-        return Outcome("ok", "", checked, True, missing)
+        return Outcome("ok", "", checked)
 
     def _drop(self) -> None:
         for queue in self.pending.values():
@@ -225,34 +262,70 @@ class Contained:
         self._failures = max(self._failures, failures)
         return Outcome("failed", reason)
 
-    def _checked(self, said: object, now_ns: int) -> tuple[tuple[Indication, ...], frozenset[str]]:
+    def _checked(self, said: object, now_ns: int) -> dict[Key, Indication]:
         if isinstance(said, (str, bytes)) or not isinstance(said, Sequence):
             raise TypeError(f"update() gave {type(said).__name__}, a sequence of Indication is expected")
-        checked: list[Indication] = []
-        subjects: set[tuple[str, str]] = set()
+        checked: dict[Key, Indication] = {}
+        kinds, name = self.kinds, self.spec.id
         for i in said:
-            if type(i) is not Indication:
-                raise TypeError(f"update() gave a {type(i).__name__} where an Indication is expected")
-            kind = self._alias.get(i.kind)
-            if kind is None:
-                raise ValueError(f"kind {i.kind!r} is not among the declared {', '.join(sorted(self.kinds))}")
-            if not (math.isfinite(i.statistic) and math.isfinite(i.threshold) and 0.0 <= i.severity <= 1.0):
-                numbers = f"statistic {i.statistic}, threshold {i.threshold}, severity {i.severity} (0..1)"
-                raise ValueError(f"{i.kind}: {numbers} are not all finite numbers")
-            if i.time_to_event_s is not None and not 0.0 <= i.time_to_event_s < math.inf:
-                raise ValueError(f"{i.kind}: time_to_event_s {i.time_to_event_s} is not a finite time from now")
-            if type(i.present) is not bool or type(i.subject) is not str or type(i.unit) is not str:
-                said_of = f"present {i.present!r} must be a bool, subject {i.subject!r} and unit {i.unit!r} str"
-                raise TypeError(f"{i.kind}: {said_of}")
-            if type(i.stamp_ns) is not int:
-                raise TypeError(f"{i.kind}: stamp {i.stamp_ns!r} must be an int of nanoseconds")
-            if i.stamp_ns > now_ns + AHEAD_NS:
-                raise ValueError(f"{i.kind}: stamp {i.stamp_ns} ns lies after the tick at {now_ns} ns")
-            if (kind, i.subject) in subjects:
+            sound = type(i) is Indication and i.kind in kinds and _is_sound(i, now_ns)
+            kind = i.kind if sound else self._kind_of(i, now_ns)
+            key = (kind, i.subject, name)
+            if key in checked:
                 raise ValueError(f"{i.kind}: two indications for subject {i.subject!r}")
-            subjects.add((kind, i.subject))
-            checked.append(_plain(i, kind))
-        return tuple(checked), self.kinds - {k for k, _ in subjects}
+            checked[key] = _detached(i) if sound else _plain(i, kind)
+        return checked
+
+    def _kind_of(self, i: object, now_ns: int) -> str:
+        """The taxonomy's id of an indication that is not sound at first sight; raises what is wrong with it."""
+        if type(i) is not Indication:
+            raise TypeError(f"update() gave a {type(i).__name__} where an Indication is expected")
+        kind = self._alias.get(i.kind)
+        if kind is None:
+            raise ValueError(f"kind {i.kind!r} is not among the declared {', '.join(sorted(self.kinds))}")
+        if not (math.isfinite(i.statistic) and math.isfinite(i.threshold) and 0.0 <= i.severity <= 1.0):
+            numbers = f"statistic {i.statistic}, threshold {i.threshold}, severity {i.severity} (0..1)"
+            raise ValueError(f"{i.kind}: {numbers} are not all finite numbers")
+        if i.time_to_event_s is not None and not 0.0 <= i.time_to_event_s < math.inf:
+            raise ValueError(f"{i.kind}: time_to_event_s {i.time_to_event_s} is not a finite time from now")
+        if type(i.present) is not bool or type(i.subject) is not str or type(i.unit) is not str:
+            said_of = f"present {i.present!r} must be a bool, subject {i.subject!r} and unit {i.unit!r} str"
+            raise TypeError(f"{i.kind}: {said_of}")
+        if type(i.stamp_ns) is not int:
+            raise TypeError(f"{i.kind}: stamp {i.stamp_ns!r} must be an int of nanoseconds")
+        if i.stamp_ns > now_ns + AHEAD_NS:
+            raise ValueError(f"{i.kind}: stamp {i.stamp_ns} ns lies after the tick at {now_ns} ns")
+        return kind
+
+
+STR, FLOAT = {str}, {float}
+
+
+def _is_sound(i: Indication, now_ns: int) -> bool:
+    """Whether every field has just its declared type and range, as nearly always; else _kind_of and _plain judge."""
+    if type(i.evidence) is not tuple or type(i.measures) is not dict:
+        return False
+    for ref in i.evidence:
+        if type(ref) is not SampleRef or type(ref.channel) is not str or type(ref.stamp_ns) is not int:
+            return False
+    if i.measures and not (set(map(type, i.measures)) == STR and set(map(type, i.measures.values())) == FLOAT):
+        return False
+    statistic, threshold, severity, tte = i.statistic, i.threshold, i.severity, i.time_to_event_s
+    return (
+        type(statistic) is type(threshold) is type(severity) is float
+        and math.isfinite(statistic + threshold)
+        and 0.0 <= severity <= 1.0
+        and (tte is None or (type(tte) is float and 0.0 <= tte < math.inf))
+        and type(i.stamp_ns) is int
+        and i.stamp_ns <= now_ns + AHEAD_NS
+        and type(i.present) is bool
+        and type(i.subject) is type(i.unit) is str
+    )
+
+
+def _detached(i: Indication) -> Indication:
+    """A copy: a detector that reuses its dict of measures must not rewrite what was decided and recorded."""
+    return msgspec.structs.replace(i, measures=i.measures.copy()) if i.measures else i
 
 
 def _plain(i: Indication, kind: str) -> Indication:
@@ -264,11 +337,10 @@ def _plain(i: Indication, kind: str) -> Indication:
     for ref in i.evidence:
         if type(ref) is not SampleRef or type(ref.channel) is not str or type(ref.stamp_ns) is not int:
             raise TypeError(f"{i.kind}: evidence {ref!r} is not a SampleRef")
-    tte = i.time_to_event_s
-    types = {type(i.statistic), type(i.threshold), type(i.severity), *map(type, i.measures.values())}
-    if types == {float} and i.kind == kind and type(tte) in (float, NoneType) and type(i.evidence) is tuple:
-        # a copy: a detector that reuses its dict must not rewrite what was decided and recorded
-        return msgspec.structs.replace(i, measures=_named(i)) if i.measures else i
+    numbers = [float(x) for x in i.measures.values()]
+    for name in i.measures:
+        if type(name) is not str:
+            raise TypeError(f"{i.kind}: measure {name!r} is not named by a str")
     return msgspec.structs.replace(
         i,
         kind=kind,
@@ -276,13 +348,6 @@ def _plain(i: Indication, kind: str) -> Indication:
         threshold=float(i.threshold),
         severity=float(i.severity),
         evidence=tuple(i.evidence),
-        time_to_event_s=None if tte is None else float(tte),
-        measures={name: float(x) for name, x in _named(i).items()},
+        time_to_event_s=None if i.time_to_event_s is None else float(i.time_to_event_s),
+        measures=dict(zip(i.measures, numbers, strict=True)),
     )
-
-
-def _named(i: Indication) -> dict[str, float]:
-    for name in i.measures:
-        if type(name) is not str:
-            raise TypeError(f"{i.kind}: measure {name!r} is not named by a str")
-    return dict(i.measures)

@@ -15,7 +15,7 @@ from typing import Literal
 import msgspec
 
 from foreshock._strict import within
-from foreshock.records import Indication, Phase, Precursor, SampleRef
+from foreshock.records import Indication, Phase, Precursor
 
 __all__ = ["Evidence", "Key", "Track", "Window", "step"]
 
@@ -55,7 +55,7 @@ class Track(msgspec.Struct, frozen=True):
     Attributes:
         present: verdict of the last observation.
         onset_ns: the current or last onset.
-        stretches: (source stamp of the onset, when last present) of stretches of presence that still count.
+        stretches: (source stamp of the onset, end) of stretches of presence that still count; the last ends at last_ns.
         occurrences_ns: occurrences that still count.
         last_ns: when it was last present.
         peaks: (first, last, severity) of stretches of presence, for the window's maximum.
@@ -80,6 +80,8 @@ class Evidence(msgspec.Struct, frozen=True):
 
     tracks: Mapping[Key, Track] = {}
 
+
+NOTHING = Evidence()
 
 BUCKET_NS = 100_000_000
 """Severities closer than this share one entry, kept until its newest expires: never shorter than the window."""
@@ -118,7 +120,8 @@ def step(
             peak = ((stamp, now_ns, seen.severity),)
             tracks[key] = Track(True, stamp, ((stamp, now_ns),), (stamp,), now_ns, peak, 0, -1, seen)
             continue
-        old = _thaw(old, now_ns)
+        if old.frozen_ns >= 0:
+            old = _thaw(old, now_ns)
         local = now_ns - old.stopped_ns
         if seen.present:
             if not old.present:
@@ -136,38 +139,37 @@ def step(
             tracks[key] = msgspec.structs.replace(old, frozen_ns=now_ns)
         else:
             tracks[key] = old
+    if not tracks:
+        return NOTHING, ()
     kept = {key: t for key, track in tracks.items() if (t := _expire(track, now_ns, span)) is not None}
     return Evidence(kept), _merge(kept, window, now_ns, fresh)
 
 
 def _thaw(track: Track, now_ns: int) -> Track:
-    if track.frozen_ns < 0:
-        return track
     stopped = track.stopped_ns + now_ns - track.frozen_ns
     return msgspec.structs.replace(track, stopped_ns=stopped, frozen_ns=-1)
 
 
 def _present(old: Track, seen: Indication, local_ns: int, recur_ns: int) -> Track:
-    stamp = min(seen.stamp_ns - old.stopped_ns, local_ns)
-    occurrences = old.occurrences_ns
-    onset = old.onset_ns
+    occurrences, onset, stretches = old.occurrences_ns, old.onset_ns, old.stretches
     if not old.present:
-        occurrences, onset = tuple(sorted((*occurrences, stamp))), stamp
-        stretches = (*old.stretches, (min(seen.stamp_ns, local_ns + old.stopped_ns), local_ns))
+        onset = min(seen.stamp_ns - old.stopped_ns, local_ns)
+        occurrences = tuple(sorted((*occurrences, onset)))
+        ended = (stretches[-1][0], old.last_ns)
+        stretches = (*stretches[:-1], ended, (min(seen.stamp_ns, local_ns + old.stopped_ns), local_ns))
     else:
-        stretches = (*old.stretches[:-1], (old.stretches[-1][0], local_ns))
         newest = occurrences[-1] if occurrences else onset
         while newest + recur_ns <= local_ns:
             newest += recur_ns
             occurrences = (*occurrences, newest)
-    first, _, peak = old.peaks[-1] if old.peaks else (local_ns, local_ns, -1.0)
-    if old.peaks and (local_ns - first < BUCKET_NS):
-        peaks = (*old.peaks[:-1], (first, local_ns, max(peak, seen.severity)))
+    kept, severity = old.peaks, seen.severity
+    if kept and local_ns - kept[-1][0] < BUCKET_NS:
+        first, _, peak = kept[-1]
+        peaks = (*kept[:-1], (first, local_ns, max(peak, severity)))
     else:
-        kept = old.peaks
-        while kept and kept[-1][2] <= seen.severity:
+        while kept and kept[-1][2] <= severity:
             kept = kept[:-1]
-        peaks = (*kept, (local_ns, local_ns, seen.severity))
+        peaks = (*kept, (local_ns, local_ns, severity))
     return Track(True, onset, stretches, occurrences, local_ns, peaks, old.stopped_ns, -1, seen)
 
 
@@ -182,7 +184,7 @@ def _expire(track: Track, now_ns: int, span_ns: int) -> Track | None:
         occurrences = tuple(t for t in occurrences if t > horizon)
     if peaks and peaks[0][1] <= horizon:
         peaks = tuple(p for p in peaks if p[1] > horizon)
-    if stretches[0][1] <= horizon:
+    if len(stretches) > 1 and stretches[0][1] <= horizon:
         stretches = tuple(s for s in stretches[:-1] if s[1] > horizon) + stretches[-1:]
     if occurrences is track.occurrences_ns and peaks is track.peaks and stretches is track.stretches:
         return track
@@ -204,10 +206,10 @@ def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[
             weight = 1.0 if track.present else math.exp((track.last_ns - local) / tau)
             q = max(weight, math.fsum(math.exp((t - local) / tau) for t in track.occurrences_ns))
         phase: Phase = "onset" if key in fresh else "ongoing" if track.present else "cleared"
-        peak = max((p[2] for p in track.peaks), default=track.seen.severity)
-        onset = min(source for source, _ in track.stretches)
         seen = track.seen
-        refs: tuple[SampleRef, ...] = seen.evidence
+        peaks, stretches = track.peaks, track.stretches
+        peak = peaks[0][2] if len(peaks) == 1 else max([p[2] for p in peaks], default=seen.severity)
+        onset = stretches[0][0] if len(stretches) == 1 else min([source for source, _ in stretches])
         mine = Precursor(
             kind,
             subject,
@@ -221,11 +223,11 @@ def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[
             seen.statistic,
             seen.threshold,
             seen.unit,
-            refs,
+            seen.evidence,
         )
-        other = found.get((kind, subject))
-        found[kind, subject] = mine if other is None else _stronger(other, mine)
-    return tuple(found[k] for k in sorted(found))
+        pair = key[:2]
+        found[pair] = _stronger(found[pair], mine) if pair in found else mine
+    return tuple(found.values())
 
 
 PHASES: Mapping[Phase, int] = {"cleared": 0, "ongoing": 1, "onset": 2}

@@ -193,15 +193,18 @@ class Arbiter:
 
     def _committed(self, state: ArbiterState, action: str, now_ns: int) -> bool:
         """Whether a mitigation has begun so lately that it is not given up: a prediction at its edge flickers."""
+        if not self.actions[action].mitigates:
+            return False
         since = state.engaged_ns.get(action)
-        begun = since is not None and action not in state.releasing and now_ns - since < MITIGATION_NS
-        return begun and self.actions[action].mitigates
+        return since is not None and action not in state.releasing and now_ns - since < MITIGATION_NS
 
     def choose(self, proposals: Sequence[Proposal], present: frozenset[str]) -> list[Proposal]:
         """One proposal per resource: mitigation, then level, then not worsening a present kind, then strength, id.
 
         Proposals of one action are one, at the highest level and strength that any of them asks for.
         """
+        if len(proposals) <= 1:
+            return list(proposals)
         merged: dict[str, Proposal] = {}
         for p in sorted(proposals, key=lambda p: (p.action, -p.level, -p.strength, p.mode, p.rule)):
             first = merged.setdefault(p.action, p)
@@ -228,20 +231,20 @@ class Arbiter:
         if not proposals and not state.active:
             return state, (), ()
         now = situation.now_ns
-        present = frozenset(p.kind for p in situation.precursors if p.phase != "cleared")
+        present = frozenset([p.kind for p in situation.precursors if p.phase != "cleared"])
         wanted = [p for p in proposals if p.strength > 0.0]
         feasible = [
             p
             for mode in dict.fromkeys(p.mode for p in wanted)
             for p in self.feasible(state, [p for p in wanted if p.mode == mode], now, situation.time_to(mode))
         ]
-        seen = tuple(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in situation.precursors)
         active: dict[str, Intervention] = {}
         engaged: dict[str, int] = {}
         changes: list[Intervention] = []
         for p in self.choose(feasible, present):
             held = state.active.get(p.action)
             if held is None or p.action in state.releasing or self._moved(held.strength, p.strength):
+                seen = [f"{e.kind}@{e.subject}" if e.subject else e.kind for e in situation.precursors]
                 held = Intervention(now, p.action, p.strength, p.mode, (p.rule, *seen))
                 changes.append(held)
             active[p.action] = held

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TypeVar, overload
+from typing import TypeAlias, overload
 
 import msgspec
 import numpy as np
@@ -16,7 +16,8 @@ from foreshock.taxonomy import Taxonomy
 
 __all__ = ["IndependentRisk", "LogisticExponential"]
 
-T = TypeVar("T")
+Counted: TypeAlias = tuple[str, str, float, float]
+"""kind, subject, weight and occurrences: all that a precursor's risk depends on."""
 
 
 class LogisticExponential(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -42,6 +43,12 @@ class LogisticExponential(msgspec.Struct, frozen=True, forbid_unknown_fields=Tru
         if not math.isfinite(self.b):
             raise ConfigError("risk.b", f"{self.b!r} is not a finite number")
 
+    def of_counts(self, m: float, q: float) -> float:
+        """P for one pair of counts."""
+        x = -self.a * (m - self.b)
+        # min() gives its first argument unless the other is smaller, so that a NaN stays one
+        return -math.expm1(-self.c * q) / (1.0 + math.exp(min(x, 700.0)))
+
     @overload
     def probability(self, m: float, q: float) -> float: ...
     @overload
@@ -49,9 +56,7 @@ class LogisticExponential(msgspec.Struct, frozen=True, forbid_unknown_fields=Tru
     def probability(self, m: ArrayLike, q: ArrayLike) -> float | NDArray[np.float64]:
         """P for m distinct precursors with q occurrences, both >= 0; arrays broadcast. NaN in, NaN out."""
         if isinstance(m, (int, float)) and isinstance(q, (int, float)):
-            x = -self.a * (m - self.b)
-            # min() gives its first argument unless the other is smaller, so that a NaN stays one
-            return -math.expm1(-self.c * q) / (1.0 + math.exp(min(x, 700.0)))
+            return self.of_counts(m, q)
         x = -self.a * (np.asarray(m, float) - self.b)
         return np.asarray(-np.expm1(-self.c * np.asarray(q, float)) / (1.0 + np.exp(np.minimum(x, 700.0))))
 
@@ -76,6 +81,7 @@ class IndependentRisk:
             {c.id: 0.0 for c in taxonomy.classes},
             dict.fromkeys(taxonomy.codes, (0.0, 0.0)),
         )
+        self._last: tuple[list[Counted], RiskEstimate] = ([], self._none)
 
     def modes_of(self, kind: str) -> Sequence[str]:
         """Accident modes that a kind counts for."""
@@ -83,34 +89,47 @@ class IndependentRisk:
 
     def estimate(self, precursors: Sequence[Precursor]) -> RiskEstimate:
         """The risk of these precursors; each (kind, subject) is one of them."""
-        if not precursors:
-            none = self._none
-            # copies: whoever writes into an estimate must not move the baseline of the next
-            return RiskEstimate(0.0, 0.0, 0.0, 0.0, 0.0, dict(none.by_mode), dict(none.by_class), dict(none.counts))
-        p_of = self._model.probability
-        m = math.fsum(p.weight for p in precursors)
-        q = math.fsum(p.occurrences for p in precursors)
+        counted = [(p.kind, p.subject, p.weight, p.occurrences) for p in precursors]
+        # counts stay the same from tick to tick but for an onset, a recurrence or an expiry
+        before, last = self._last
+        if counted != before:
+            last = self._estimate(counted) if counted else self._none
+            self._last = counted, last
+        # copies: whoever writes into an estimate must not move that of the next tick
+        return RiskEstimate(
+            last.probability,
+            last.lower,
+            last.upper,
+            last.m,
+            last.q,
+            last.by_mode.copy(),
+            last.by_class.copy(),
+            last.counts.copy(),
+            last.attribution,
+        )
+
+    def _estimate(self, counted: Sequence[Counted]) -> RiskEstimate:
+        p_of = self._model.of_counts
+        m = math.fsum([weight for _, _, weight, _ in counted])
+        q = math.fsum([occurrences for _, _, _, occurrences in counted])
         probability = p_of(m, q)
-        by_mode, counts = self._grouped(precursors, self._modes, self._none.by_mode)
-        by_class, _ = self._grouped(precursors, self._class, self._none.by_class)
+        by_mode, counts = self._grouped(counted, self._modes, self._none.by_mode)
+        by_class, _ = self._grouped(counted, self._class, self._none.by_class)
         shares = tuple(
-            Attribution(p.kind, p.subject, probability - p_of(m - p.weight, q - p.occurrences)) for p in precursors
+            [
+                Attribution(kind, subject, probability - p_of(m - weight, q - occurrences))
+                for kind, subject, weight, occurrences in counted
+            ]
         )
         all_counts = {**self._none.counts, **counts}
         return RiskEstimate(probability, probability, probability, m, q, by_mode, by_class, all_counts, shares)
 
     def _grouped(
-        self, precursors: Iterable[Precursor], groups: Mapping[str, Sequence[str]], zero: Mapping[str, float]
+        self, counted: Iterable[Counted], groups: Mapping[str, Sequence[str]], zero: Mapping[str, float]
     ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
         counts: dict[str, tuple[float, float]] = {}
-        for p in precursors:
-            for group in groups[p.kind]:
+        for kind, _, weight, occurrences in counted:
+            for group in groups[kind]:
                 m, q = counts.get(group, (0.0, 0.0))
-                counts[group] = (m + p.weight, q + p.occurrences)
-        risks = dict(zero)
-        cache: dict[tuple[float, float], float] = {}
-        for group, mq in counts.items():
-            if mq not in cache:
-                cache[mq] = self._model.probability(*mq)
-            risks[group] = cache[mq]
-        return risks, counts
+                counts[group] = (m + weight, q + occurrences)
+        return {**zero, **{group: self._model.of_counts(m, q) for group, (m, q) in counts.items()}}, counts

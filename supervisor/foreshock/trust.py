@@ -16,7 +16,7 @@ from foreshock.errors import ConfigError, nearest
 from foreshock.records import ProtectionLevel, RiskEstimate, Trust
 from foreshock.taxonomy import Taxonomy
 
-__all__ = ["Gates", "LevelState", "TrustModel", "TrustSettings", "TrustState", "level_step"]
+__all__ = ["Gates", "LevelState", "TrustModel", "TrustSettings", "TrustState", "level_step", "levels_step"]
 
 
 class TrustSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -101,22 +101,27 @@ class TrustModel:
         since = {kind: state.unobserved_ns.get(kind, now_ns) for kind in unobserved}
         overdue = any(now_ns - t > self._settings.grace_s * 1e9 for t in since.values())
         gain = 1.0 if state.at_ns < 0 else 1.0 - math.exp((state.at_ns - now_ns) / (self._settings.recovery_s * 1e9))
-        capped = {mode for kind in unobserved for mode in self._modes[kind]}
         cap = self._settings.unobserved_cap
         trust = _complement(risk.upper)
         overall = _follow(state.overall, min(trust, cap) if unobserved else trust, gain)
-        by_mode: dict[str, float] = {}
-        control: dict[str, float] = {}
-        for mode, p in risk.by_mode.items():
-            t = _complement(p)
-            by_mode[mode] = t
-            control[mode] = _follow(state.by_mode.get(mode, 1.0), min(t, cap) if mode in capped else t, gain)
+        by_mode = _complements(risk.by_mode)
+        targets = by_mode
+        if unobserved:
+            capped = {mode for kind in unobserved for mode in self._modes[kind]}
+            targets = {mode: min(t, cap) if mode in capped else t for mode, t in by_mode.items()}
+        before = state.by_mode
+        if targets == before:
+            control = targets.copy()
+        else:
+            control = {
+                mode: t if t <= (old := before.get(mode, 1.0)) else _follow(old, t, gain) for mode, t in targets.items()
+            }
         now = Trust(
             trust,
             overall,
             by_mode,
             control,
-            {c: _complement(p) for c, p in risk.by_class.items()},
+            _complements(risk.by_class),
             1.0 - len(unobserved) / len(self._modes) if self._modes else 0.0,
             tuple(sorted(unobserved)),
         )
@@ -128,8 +133,17 @@ def _complement(p: float) -> float:
     return 1.0 - p if 0.0 <= p <= 1.0 else 0.0
 
 
+def _complements(risks: Mapping[str, float]) -> dict[str, float]:
+    """_complement of each, without a call for each."""
+    return {group: 1.0 - p if 0.0 <= p <= 1.0 else 0.0 for group, p in risks.items()}
+
+
 def _follow(old: float, target: float, gain: float) -> float:
     return target if target <= old else old + (target - old) * gain
+
+
+LEVELS = tuple(ProtectionLevel)
+NORMAL, CAUTION, PROTECTIVE, MINIMAL_RISK = map(int, LEVELS)
 
 
 class LevelState(msgspec.Struct, frozen=True):
@@ -139,6 +153,9 @@ class LevelState(msgspec.Struct, frozen=True):
     demanded_ns: tuple[int, int, int, int] = (-1, -1, -1, -1)
 
 
+FRESH = LevelState()
+
+
 def level_step(state: LevelState, gates: Gates, trust: float, overdue: bool, now_ns: int) -> LevelState:
     """The protection level after a tick: escalation at once, release after hysteresis and dwell, latches held.
 
@@ -146,21 +163,28 @@ def level_step(state: LevelState, gates: Gates, trust: float, overdue: bool, now
     """
     if state.level is ProtectionLevel.NORMAL and trust >= gates.caution and not overdue:
         return state
-    levels = (ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE, ProtectionLevel.MINIMAL_RISK)
-    edges = (gates.caution, gates.protective, 0.0)
-    dwell_ns = round(gates.dwell_s * 1e9)
+    held, latch, dwell_ns = int(state.level), LATCHES[gates.latch], round(gates.dwell_s * 1e9)
     demanded = list(state.demanded_ns)
-    level = ProtectionLevel.NORMAL
-    for candidate, edge in zip(levels, edges, strict=True):
-        holds = state.level >= candidate
-        if candidate is ProtectionLevel.MINIMAL_RISK:
-            wanted = overdue
-        else:
-            wanted = not (trust >= (min(edge + gates.hysteresis, 1.0) if holds else edge))
+    level = NORMAL
+    for candidate, edge in ((CAUTION, gates.caution), (PROTECTIVE, gates.protective), (MINIMAL_RISK, 0.0)):
+        holds = held >= candidate
+        gate = min(edge + gates.hysteresis, 1.0) if holds else edge
+        wanted = overdue if candidate == MINIMAL_RISK else not (trust >= gate)
         if wanted:
             demanded[candidate] = now_ns
         last = demanded[candidate]
-        latched = holds and candidate >= LATCHES[gates.latch]
-        if wanted or latched or (holds and last >= 0 and now_ns - last < dwell_ns):
+        if wanted or (holds and (candidate >= latch or (last >= 0 and now_ns - last < dwell_ns))):
             level = candidate
-    return LevelState(level, (demanded[0], demanded[1], demanded[2], demanded[3]))
+    return LevelState(LEVELS[level], (demanded[0], demanded[1], demanded[2], demanded[3]))
+
+
+def levels_step(
+    states: Mapping[str, LevelState], gates: Gates, trust: Mapping[str, float], now_ns: int
+) -> dict[str, LevelState]:
+    """level_step of every accident mode, by its control-level trust; lost evidence is the overall level's concern."""
+    after: dict[str, LevelState] = {}
+    for mode, t in trust.items():
+        state = states.get(mode, FRESH)
+        calm = state.level is ProtectionLevel.NORMAL and t >= gates.caution  # as level_step itself begins
+        after[mode] = state if calm else level_step(state, gates, t, False, now_ns)
+    return after

@@ -1,4 +1,4 @@
-"""Every code block of the README and of docs/ runs: python in one namespace a page, sh in one folder a page, toml parses."""
+"""Every code block of the README and of docs/ runs: python in one namespace, sh in one folder a page, toml parses."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KNOWN = {"python", "sh", "toml", "text", "c", "json", ""}
 
 FILES = {
     "bind-an-fmu.md": {"[binding]": ["my-binding.toml"], 'id = "my-slip"': ["my-scenario.toml"]},
-    "write-a-detector.md": {},
+    "README.md": {"[supervisor]": ["robot.toml"]},
 }
 """What a page tells its reader to save, by page and first line of the block."""
 
@@ -48,12 +48,13 @@ def run_toml(example: Example) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_every_block_runs(page: Path, tmp_path: Path) -> None:
+def test_every_block_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     languages = {line.strip()[3:] for line in page.read_text().splitlines() if line.strip().startswith("```")}
     assert languages <= KNOWN, "a block in a language that nobody runs"
     shell, toml = CodeBlockParser("sh", run_shell), CodeBlockParser("toml", run_toml)
     document = Sybil([PythonCodeBlockParser(), shell, toml, SkipParser()]).parse(page)
     document.namespace["__folder__"] = tmp_path
+    monkeypatch.chdir(tmp_path)
     for example in document.examples():
         example.evaluate()
 

@@ -93,19 +93,22 @@ class BalanceDetector:
             self._restart(stamp_ns)
         self._stamp_ns = stamp_ns
         wrenches = self._take_wrenches(body, inputs)
-        refs = [joints, odometry, *wrenches.values()]
+        refs = [_ref(joints), _ref(odometry)]
+        of_foot = {foot: _ref(sample) for foot, sample in wrenches.items()}
+        newest_ns = max(stamp_ns, odometry.stamp_ns)
         plan = inputs.latest.get("plan")
         planned_m = _value(plan).com[1] if plan is not None else math.nan
-        if plan is not None and math.isfinite(planned_m):
-            refs.append(plan)
-            self._planned = True
-        else:
-            planned_m = None
+        if not math.isfinite(planned_m):
+            plan, planned_m = None, None
+        self._planned |= plan is not None
         self._com.update(body, planned_m, self._com_nominal.value)
         self._stability.update(body, self._contacts(wrenches))
         self._cross_check(imu, dt_s)
-        self._slip_answer = self._slip_indications(body, joints, odometry, wrenches)
-        evidence, newest_ns = _evidence(refs)
+        self._slip_answer = self._slip_indications(body, (*refs,), newest_ns, of_foot)
+        refs += of_foot.values()
+        if plan is not None:
+            refs.append(_ref(plan))
+        evidence, newest_ns = tuple(refs), max([ref.stamp_ns for ref in refs])
         # a plan that is lost widens the threshold: what is below it then says nothing, and is not reported
         speaks = planned_m is not None or not self._planned or self._com.present
         self._body_answer = [self._com_indication(evidence, newest_ns)] if speaks else []
@@ -173,8 +176,9 @@ class BalanceDetector:
         self._disagreement = raw
 
     def _slip_indications(
-        self, body: BodyState, joints: Sample, odometry: Sample, wrenches: dict[str, Sample]
+        self, body: BodyState, state: tuple[SampleRef, ...], newest_ns: int, wrenches: dict[str, SampleRef]
     ) -> list[Indication]:
+        """For the feet of these wrenches; state are the other samples behind them, newest_ns their newest stamp."""
         observed = [foot for foot in wrenches if self._slips[foot].observed]
         answer = []
         for foot, sole in zip(FEET, (body.left, body.right), strict=True):
@@ -182,18 +186,18 @@ class BalanceDetector:
             present = slip.present
             if foot not in observed or (len(observed) < len(FEET) and not present):
                 continue
-            evidence, newest_ns = _evidence([joints, odometry, wrenches[foot]])
+            wrench = wrenches[foot]
             answer.append(
                 Indication(
                     kind="foot-micro-slip",
                     subject=foot,
-                    stamp_ns=newest_ns,
+                    stamp_ns=max(newest_ns, wrench.stamp_ns),
                     present=present,
                     statistic=slip.slip_m,
                     threshold=slip.threshold_m,
                     unit="m",
                     severity=ramp(slip.slip_m, self._config.slip_m, self._config.slip_full_m) if present else 0.0,
-                    evidence=evidence,
+                    evidence=(*state, wrench),
                     time_to_event_s=self._stability.time_to_fall_s if present else None,
                     measures={
                         "loaded": float(load.loaded),
@@ -298,5 +302,5 @@ def _vertical(sole: SolePose, force: Vec3) -> float:
     return zx * force[0] + zy * force[1] + zz * force[2]
 
 
-def _evidence(samples: list[Sample]) -> tuple[tuple[SampleRef, ...], int]:
-    return tuple([SampleRef(s.channel, s.stamp_ns) for s in samples]), max([s.stamp_ns for s in samples])
+def _ref(sample: Sample) -> SampleRef:
+    return SampleRef(sample.channel, sample.stamp_ns)

@@ -24,19 +24,26 @@ def convex_hull(points: Iterable[Point]) -> list[Point]:
     if len(ordered) < 3:
         return ordered
     lower = _chain(ordered)
-    upper = _chain(ordered[::-1])
-    return lower[:-1] + upper[:-1]
+    ordered.reverse()
+    upper = _chain(ordered)
+    del lower[-1], upper[-1]
+    return lower + upper
 
 
-def _chain(points: Sequence[Point]) -> list[Point]:
+def _chain(points: Iterable[Point]) -> list[Point]:
     chain: list[Point] = []
-    for x, y in points:
-        while len(chain) > 1:
-            (ax, ay), (bx, by) = chain[-2], chain[-1]
-            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
-                break
+    ax = ay = bx = by = 0.0  # the last corner but one, and the last
+    for point in points:
+        x, y = point
+        n = len(chain)
+        while n > 1 and (bx - ax) * (y - ay) <= (by - ay) * (x - ax):
             chain.pop()
-        chain.append((x, y))
+            n -= 1
+            bx, by = ax, ay
+            if n > 1:
+                ax, ay = chain[n - 2]
+        chain.append(point)
+        ax, ay, bx, by = bx, by, x, y
     return chain
 
 

@@ -110,12 +110,12 @@ class Stability:
         if last is None or dt > self._config.gap_s:
             self._rate, self._rate_ns = None, body.stamp_ns
             return
-        raw = [(b - a) / dt for a, b in zip(last.momentum, body.momentum, strict=True)]
-        rate = self._rate
-        if rate is not None:
-            k = weight(dt, self._config.acceleration_filter_s)
-            raw = [r + k * (x - r) for r, x in zip(rate, raw, strict=True)]
-        self._rate = raw
+        pairs, rate = zip(last.momentum, body.momentum, strict=True), self._rate
+        if rate is None:
+            self._rate = [(b - a) / dt for a, b in pairs]
+            return
+        k = weight(dt, self._config.acceleration_filter_s)
+        self._rate = [r + k * ((b - a) / dt - r) for r, (a, b) in zip(rate, pairs, strict=True)]
 
     def _pressure(
         self,

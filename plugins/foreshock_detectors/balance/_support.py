@@ -14,13 +14,15 @@ class SoleRectangle:
 
     def __init__(self, config: BalanceConfig) -> None:
         x0, x1, y = config.sole_x_min_m, config.sole_x_max_m, config.sole_y_half_m
-        self._corners = ((x0, -y), (x1, -y), (x1, y), (x0, y))
+        self._heel_m, self._toe_m, self._side_m = x0, x1, y
 
     def corners(self, sole: SolePose) -> list[Point]:
         """The four corners in the ground plane of odom (m), counterclockwise for a sole that stands on it."""
         (xx, xy, _), (yx, yy, _), _ = sole.rotation
-        x, y = sole.x, sole.y
-        return [(x + xx * a + xy * b, y + yx * a + yy * b) for a, b in self._corners]
+        a, b, c = self._heel_m, self._toe_m, self._side_m
+        hx, hy, tx, ty = sole.x + xx * a, sole.y + yx * a, sole.x + xx * b, sole.y + yx * b
+        sx, sy = xy * c, yy * c
+        return [(hx - sx, hy - sy), (tx - sx, ty - sy), (tx + sx, ty + sy), (hx + sx, hy + sy)]
 
 
 class Load:

@@ -70,9 +70,13 @@ class Swing:
 
     def _amplitude(self, stamp_ns: int) -> float:
         oldest = stamp_ns - self._window_ns
-        while self._oscillations and self._oscillations[0][0] < oldest:
-            self._oscillations.popleft()
-        amplitude = max((a for _, a in self._oscillations), default=0.0)
+        seen = self._oscillations
+        while seen and seen[0][0] < oldest:
+            seen.popleft()
+        amplitude = 0.0
+        for _, a in seen:
+            if a > amplitude:
+                amplitude = a
         if self._turn_ns >= oldest:
             amplitude = max(amplitude, min(self._half, self._running_half()))
         return amplitude

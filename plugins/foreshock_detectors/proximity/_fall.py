@@ -50,7 +50,7 @@ class Topple:
 
         e: where the support ends (m), from the origin of the robot's ends; rho: how far beyond it a fall reaches (m).
         """
-        x = self._ends @ u
+        x = self._ends.dot(u)
         edge_m = float((x + self._radius)[self._support].max())
         x -= edge_m
         np.hypot(x, self._height, x)
@@ -70,5 +70,5 @@ class Topple:
         # where he stands in the robot itself, any direction will do
         u = np.array((x / away, y / away, 0.0) if away > 1e-6 else (1.0, 0.0, 0.0))
         edge_m, reach_m = self.reaches_m(u)
-        nearest_m = float((ends.reshape(-1, 3) @ u - radius).min()) + (away if away > 1e-6 else x)
+        nearest_m = float((ends.reshape(-1, 3).dot(u) - radius).min()) + (away if away > 1e-6 else x)
         return nearest_m - edge_m - reach_m

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import numpy as np
 
@@ -19,6 +21,8 @@ from foreshock_detectors.proximity._separation import ProtectiveSeparation, prot
 __all__ = ["Nearest", "NearestPairs", "approach_speeds"]
 
 _SUM = np.ones(3)
+# as arrays, which numpy need not convert at every call
+_ZERO, _ONE, _TINY = np.array(0.0), np.array(1.0), np.array(1e-12)
 
 
 class Nearest(msgspec.Struct, frozen=True, gc=False):
@@ -71,14 +75,14 @@ class NearestPairs:
         for person in present:
             centre = people.centre(person, now_ns, body.origin)
             there = np.array(centre)
-            i, j, point = self._scene(person).closest(body, centre)
+            i, j, point = self._scene(person).closest(body, there)
             distance_m = checked_distance_m(
                 _placed(body.ends[i], body.radius.item(i)),
                 _placed(person.ends[j] + there, person.radius.item(j)),
                 config.consistency_m,
             )
             self._audit(body, person, there, distance_m)
-            speeds = approach_speeds(body.ends, body.velocities, body.length2, point + there)
+            speeds = approach_speeds(body.axes, body.velocities, body.length2, point)
             speeds += body.speed
             robot_speed_m_s = float(speeds.max())
             clearance_m = None if topple is None else topple.clearance_m(centre, person.ends, person.end_radius)
@@ -100,7 +104,12 @@ class NearestPairs:
         k = len(person.radius)
         i, j = divmod(self._turn % (len(body.radius) * k), k)
         (a, b), (c, d) = body.ends[i].tolist(), (person.ends[j] + there).tolist()
-        other_m = segment_distance_m(a, b, c, d) - body.radius.item(i) - person.radius.item(j)
+        radii_m = body.radius.item(i) + person.radius.item(j)
+        # the balls around both are closer than the capsules themselves: mostly that is answer enough
+        middles_m = 0.5 * math.hypot(a[0] + b[0] - c[0] - d[0], a[1] + b[1] - c[1] - d[1], a[2] + b[2] - c[2] - d[2])
+        if middles_m - body.half_m[i] - person.half_m[j] - radii_m >= distance_m:
+            return
+        other_m = segment_distance_m(a, b, c, d) - radii_m
         if not other_m >= distance_m - self._config.consistency_m:
             raise ValueError(
                 f"capsules {i} and {j} are {other_m:.6f} m apart, the closest are said to be {distance_m:.6f} m"
@@ -126,15 +135,15 @@ def approach_speeds(ends: Array, velocities: Array, length2: Array, point: Array
     start = ends[:, 0]
     along = ends[:, 1] - start
     rest = point - start
-    t = (rest * along) @ _SUM
+    t = (rest * along).dot(_SUM)
     t /= length2
-    np.minimum(np.maximum(t, 0.0, out=t), 1.0, out=t)
+    np.minimum(np.maximum(t, _ZERO, out=t), _ONE, out=t)
     rest -= along * t[:, None]
-    distance = np.sqrt((rest * rest) @ _SUM)
-    towards = (velocities * rest[:, None]) @ _SUM
-    speeds = np.maximum(towards[:, 0], towards[:, 1])
+    distance = np.sqrt((rest * rest).dot(_SUM))
+    speeds = np.maximum((velocities[:, 0] * rest).dot(_SUM), (velocities[:, 1] * rest).dot(_SUM))
     # a point on the axis lies in no direction; then the quotient is bounded by the speed itself
-    return np.asarray(speeds / np.maximum(distance, 1e-12), dtype=np.float64)
+    speeds /= np.maximum(distance, _TINY)
+    return np.asarray(speeds, dtype=np.float64)
 
 
 def _placed(ends: Array, radius: float) -> PlacedCapsule:

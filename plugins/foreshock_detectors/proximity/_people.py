@@ -24,6 +24,7 @@ class Person(msgspec.Struct, frozen=True):
         ends: both ends of each of his k capsules relative to his centre, shape (k, 2, 3), m.
         radius: shape (k,), m.
         end_radius: the same for each end, shape (2 k,), m.
+        half_m: half the length of each segment (m).
         centre: mean of the ends, in odom (m).
         velocity: of his trunk (m/s), None if it is not measured.
         speed_m_s: its magnitude.
@@ -35,6 +36,7 @@ class Person(msgspec.Struct, frozen=True):
     ends: Array
     radius: Array
     end_radius: Array
+    half_m: tuple[float, ...]
     centre: Vec3
     velocity: Vec3 | None
     speed_m_s: float | None
@@ -118,5 +120,14 @@ def _person(pose: HumanPose, stamp_ns: int) -> Person:
     speed = None if velocity is None else math.hypot(*velocity)
     radius = np.array([c.radius for c in pose.capsules])
     return Person(
-        pose.id, stamp_ns, ends - centre, radius, radius.repeat(2), (x, y, z), velocity, speed, pose.uncertainty
+        id=pose.id,
+        stamp_ns=stamp_ns,
+        ends=ends - centre,
+        radius=radius,
+        end_radius=radius.repeat(2),
+        half_m=tuple([0.5 * math.dist(c.a, c.b) for c in pose.capsules]),
+        centre=(x, y, z),
+        velocity=velocity,
+        speed_m_s=speed,
+        uncertainty_m=pose.uncertainty,
     )

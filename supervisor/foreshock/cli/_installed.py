@@ -7,14 +7,13 @@ import re
 
 import msgspec
 
-from foreshock import hookspecs
 from foreshock.detector import DetectorSpec, Isolation
 from foreshock.errors import ForeshockError
 from foreshock.hookspecs import GROUP
 from foreshock.registry import Broken, Registry
 from foreshock.supervisor import inputs_of
 
-__all__ = ["DetectorInfo", "Extra", "InputInfo", "distribution_of", "extra_of", "installed", "unmarked_hooks"]
+__all__ = ["DetectorInfo", "Extra", "InputInfo", "distribution_of", "extra_of", "installed"]
 
 
 class InputInfo(msgspec.Struct, frozen=True):
@@ -64,9 +63,6 @@ def installed() -> tuple[tuple[DetectorInfo, ...], tuple[Broken, ...]]:
         registry = Registry()
         try:
             registry.load(name)
-            unmarked = unmarked_hooks(name)
-            if unmarked:
-                broken.append(Broken(name, f"plugin {name}: {unmarked}"))
             for spec in registry.detectors():
                 if spec.id == name:
                     found[name] = _info(spec, name)
@@ -85,17 +81,6 @@ def _info(spec: DetectorSpec, plugin: str) -> DetectorInfo:
     inputs = tuple(InputInfo(i.name, i.channel, i.type.__name__, i.required) for i in inputs_of(spec, spec.config()))
     extra, origin = extra_of(spec), distribution_of(plugin)
     return DetectorInfo(spec.id, spec.summary, tuple(spec.kinds), inputs, spec.isolation, extra, plugin, origin)
-
-
-def unmarked_hooks(plugin: str) -> str:
-    """What is wrong if a loaded plugin has a hook without its mark, which is then never called; empty if nothing."""
-    for point in md.entry_points(group=GROUP, name=plugin):
-        module = point.load()
-        for hook in sorted(h for h in vars(hookspecs) if h.startswith("foreshock_")):
-            function = getattr(module, hook, None)
-            if callable(function) and not hasattr(function, f"{GROUP}_impl"):
-                return f"{hook}() lacks @hookimpl, so that it is never called"
-    return ""
 
 
 def distribution_of(plugin: str) -> str:

@@ -31,13 +31,13 @@ SHOWN = (ArmSpec("unsupervised (shadow)", "shadow", "ladder"), *ARMS[1:])
 """The first run is judged but not acted on, so that its P and T can be shown too."""
 
 NOTES = (
-    "The paper's case study A1, “fall onto human”, in closed loop on a frontal-plane plant of TALOS packaged as an FMU: "
-    "while stepping in place one foot meets a patch of low friction. Slip, torso spike and the deviation of the centre "
-    "of mass are found by the detectors in noisy sensor streams; nothing of the cascade is scripted.",
-    "P is Eq. 1 of the paper on the precursors tied to A1, and T = 1 − P. The paper's gate acts at T < 0.3, which waits "
-    "for the third precursor; the ladder suppresses the next step at a caution gate of T < 0.6 and takes all four "
-    "protocols at T < 0.3. Plant, thresholds and gates were chosen on seeds below 10000; all figures here are on seeds "
-    "from 10000 on.",
+    "The paper's case study A1, “fall onto human”, in closed loop on a frontal-plane plant of TALOS packaged as an "
+    "FMU: while stepping in place one foot meets a patch of low friction. Slip, torso spike and the deviation of the "
+    "centre of mass are found by the detectors in noisy sensor streams; nothing of the cascade is scripted.",
+    "P is Eq. 1 of the paper on the precursors tied to A1, and T = 1 − P. The paper's gate acts at T < 0.3, which "
+    "waits for the third precursor; the ladder suppresses the next step at a caution gate of T < 0.6 and takes all "
+    "four protocols at T < 0.3. Plant, thresholds and gates were chosen on seeds below 10000; all figures here are on "
+    "seeds from 10000 on.",
 )
 
 

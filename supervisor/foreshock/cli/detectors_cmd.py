@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from rich.markup import escape
 
-from foreshock.cli._installed import Extra, distribution_of, extra_of, installed, unmarked_hooks
+from foreshock.cli._installed import Extra, distribution_of, extra_of, installed
 from foreshock.cli._new_plugin import write_project
 from foreshock.cli.output import NEGATIVE, OK, console, emit, table
 from foreshock.errors import ConfigError, ForeshockError, nearest
@@ -77,9 +77,6 @@ def _checks(name: str, registry: Registry) -> tuple[Check, ...]:
     """Loading, then the static checks; what cannot be checked because something before it failed is left out."""
     try:
         registry.load(name)
-        unmarked = unmarked_hooks(name)
-        if unmarked:
-            return (Check("plugin loads and offers the detector", unmarked),)
         spec = registry.detector(name, "detectors check")
         precursors = registry.precursors()
     except ForeshockError as e:

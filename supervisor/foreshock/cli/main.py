@@ -8,7 +8,6 @@ import click
 
 from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
-
 from foreshock.cli.detectors_cmd import detectors
 from foreshock.cli.output import BAD_INPUT, FAILED, OK, emit, notes
 from foreshock.cli.scenarios_cmd import scenarios

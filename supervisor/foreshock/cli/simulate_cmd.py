@@ -48,6 +48,7 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
 @click.option(
     "--set", "parameters", multiple=True, callback=_values, metavar="NAME=NUMBER", help="Set a parameter of the twin."
 )
+@click.option("--duration", type=float, help="Simulated time in s; the scenario's own by default.")
 @click.option("--timeout", type=float, default=120.0, show_default=True, help="Wall-clock limit in s.")
 @click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="Write an HTML report here.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -58,6 +59,7 @@ def simulate(
     policy: str | None,
     seed: int,
     parameters: dict[str, float],
+    duration: float | None,
     timeout: float,
     report: Path | None,
     as_json: bool,
@@ -71,6 +73,8 @@ def simulate(
     if twin is not None and twin != found.twin["kind"]:
         registry.twin(twin, "--twin")
         found = msgspec.structs.replace(found, twin={"kind": twin})
+    if duration is not None:
+        found = msgspec.structs.replace(found, duration_s=duration)
     with Progress(console=notes, transient=True, disable=as_json) as progress:
         progress.add_task(f"{found.id} ({found.duration_s:g} s)", total=None)
         run = run_one(Job(found, arm, seed), timeout)

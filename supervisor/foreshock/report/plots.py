@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -41,11 +42,12 @@ def runs_figure(runs: Sequence[tuple[str, Run]]) -> Figure:
     figure = Figure(figsize=(5.0 * n + 1.0, 8.6), layout="constrained")
     axes = figure.subplots(3, n, sharex=True, sharey="row", squeeze=False, height_ratios=(3, 3, 2))
     low, high = _span([r for _, r in runs])
+    axes[0][0].set_ylabel("probability, trust")
+    axes[1][0].set_ylabel("lateral position (mm)")
     names = sorted({i.action for _, r in runs for i in r.interventions})
     for k, (label, run) in enumerate(runs):
-        first = k == 0
-        _risk(axes[0][k], run, first)
-        _balance(axes[1][k], run, first)
+        _risk(axes[0][k], run)
+        _balance(axes[1][k], run)
         _actions(axes[2][k], run, names)
         outcome = run.outcome.replace("-", " ") if run.events else "upright"
         axes[0][k].set_title(f"{label}\n{outcome}", fontweight="bold", color=RISK if run.events else "#2a7d4f")
@@ -57,10 +59,15 @@ def runs_figure(runs: Sequence[tuple[str, Run]]) -> Figure:
             for t in run.first_s.values():
                 a.axvline(t, color=GREY, lw=0.8, ls=":")
             a.grid(alpha=0.25, lw=0.5)
+    keys: dict[str, Artist] = {}
+    for a in axes[:2].flat:
+        handles, labels = a.get_legend_handles_labels()
+        keys |= dict(zip(labels, handles, strict=True))
+    figure.legend(list(keys.values()), list(keys), loc="outside lower center", ncols=len(keys), frameon=False)
     return figure
 
 
-def _risk(a: Axes, run: Run, labelled: bool) -> None:
+def _risk(a: Axes, run: Run) -> None:
     t = _column(run, "t_s")
     for name, colour, label in (
         ("p", RISK, "P"),
@@ -76,12 +83,9 @@ def _risk(a: Axes, run: Run, labelled: bool) -> None:
     for k, (kind, at) in enumerate(sorted(run.first_s.items(), key=lambda i: i[1])):
         a.annotate(kind, (at, 1.015 - 0.075 * (k % 4)), fontsize=7, ha="left", va="top", color="#444444")
     a.set_ylim(-0.03, 1.06)
-    a.set_ylabel("probability, trust")
-    if labelled:
-        a.legend(loc="center left", fontsize=8, framealpha=0.9)
 
 
-def _balance(a: Axes, run: Run, labelled: bool) -> None:
+def _balance(a: Axes, run: Run) -> None:
     t = _column(run, "t_s")
     if t is None:
         return
@@ -97,9 +101,6 @@ def _balance(a: Axes, run: Run, labelled: bool) -> None:
         if y is not None:
             a.plot(t, 1e3 * y, color=colour, lw=1.4, label=label)
     a.set_ylim(-420, 420)
-    a.set_ylabel("lateral position (mm)")
-    if labelled:
-        a.legend(loc="lower left", fontsize=8, framealpha=0.9)
 
 
 def _actions(a: Axes, run: Run, names: Sequence[str]) -> None:

@@ -6,6 +6,7 @@ reuses them by reset. Everything temporary lies in one scratch folder that the p
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -79,6 +80,7 @@ def _work(job: Job, scratch: str) -> Run:
         key = msgspec.json.encode(("supervisor", job.scenario.config), order="sorted")
         if key not in _BENCH:
             _BENCH[key] = Supervisor(job.scenario.supervisor(), Path(job.scenario.folder), registry)
+        gc.freeze()  # a full collection would walk through all that set-up made, in the middle of a tick
         judge = _BENCH[key]
     try:
         return simulate(job.scenario, _BENCH[twin_key], judge, job.arm, job.seed, detail=job.detail)

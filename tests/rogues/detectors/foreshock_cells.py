@@ -56,7 +56,7 @@ class Cell:
         number = np.float64(1.0) if what == NUMPY else 1.0
         measures = {"pid": float(os.getpid()), "seed": float(self._seed)}
         if what == FLOOD:
-            print("x" * 200_000, flush=True)  # noqa: T201 # a rogue
+            print("x" * 200_000, flush=True)  # a rogue
         ref = (SampleRef(sample.channel, sample.stamp_ns),)
         return [
             Indication(SLIP, "", sample.stamp_ns, what == PRESENT, number, 1.0, "1", number, ref, measures=measures)

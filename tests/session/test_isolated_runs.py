@@ -1,0 +1,122 @@
+"""Runs in watched processes: what an FMU can do to a run, and that it costs no other run and leaves nothing behind."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from foreshock.errors import BadInputError, ConfigError
+from foreshock.session.isolated import Failure, Job, run_all
+from foreshock.session.run import Run
+from foreshock.session.scenario import Scenario, load_scenario
+
+ROGUE = Path(__file__).parents[1] / "rogues" / "fmus" / "rogue"
+BEHAVIOURS = {"error": 1, "discard": 2, "nan": 3, "hang": 4, "crash": 5}  # rogue.toml
+
+SCENARIO = f"""
+id = "rogue"
+title = "A plant that misbehaves"
+mode = "A1"
+expect = "open"
+duration_s = 0.1
+
+[twin]
+kind = "fmi"
+plant = "{ROGUE}"
+binding = "{ROGUE / "binding.toml"}"
+
+[config.supervisor]
+period_s = 0.001
+
+[[config.detectors]]
+use = "telemetry"
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Scenario:
+    file = tmp_path / "rogue.toml"
+    file.write_text(SCENARIO)
+    return load_scenario(file)
+
+
+def left_behind() -> set[str]:
+    return {p.name for p in Path(tempfile.gettempdir()).glob("foreshock-*")}
+
+
+def test_each_failure_is_classified_and_costs_no_other_run(scenario: Scenario) -> None:
+    before = left_behind()
+    jobs = [Job(scenario, "shadow", seed) for seed in range(3)]
+    for kind, behaviour in BEHAVIOURS.items():
+        jobs.append(Job(scenario.with_({"behaviour": float(behaviour)}), "shadow", 0))
+        jobs.append(Job(scenario, "shadow", len(kind)))
+    results = run_all(jobs, workers=2, timeout_s=5.0)
+    kinds = [r.kind if isinstance(r, Failure) else "ok" for r in results]
+    wanted = ["ok"] * 3
+    for kind in BEHAVIOURS:
+        wanted += [kind, "ok"]
+    assert kinds == wanted
+    assert left_behind() <= before
+    crash = results[kinds.index("crash")]
+    assert isinstance(crash, Failure)
+    assert "SIGSEGV" in crash.detail
+    for kind in ("error", "discard"):
+        failure = results[kinds.index(kind)]
+        assert isinstance(failure, Failure)
+        assert "on purpose" in failure.log  # the FMU's own words
+    nan = results[kinds.index("nan")]
+    assert isinstance(nan, Failure)
+    assert "count" in nan.detail
+
+
+def test_results_do_not_depend_on_workers_or_what_ran_before(scenario: Scenario) -> None:
+    jobs = [Job(scenario, "shadow", seed) for seed in range(4)]
+    one = run_all(jobs, workers=1)
+    two = run_all(jobs[::-1], workers=2)[::-1]
+    assert all(isinstance(r, Run) and r.digest for r in one)
+    # series hold NaN where a value does not exist, and NaN equals nothing
+    assert [msgspec.structs.replace(r, series={}) for r in one] == [msgspec.structs.replace(r, series={}) for r in two]
+    assert [str(r.series) for r in one] == [str(r.series) for r in two]
+
+
+def test_bad_input_of_a_job_is_raised(scenario: Scenario) -> None:
+    with pytest.raises(BadInputError, match="did you mean 'behaviour'"):
+        run_all([Job(scenario.with_({"behavior": 1.0}), "off", 0)])
+
+
+@pytest.mark.parametrize("kind", ["error", "crash", "hang"])
+def test_the_command_ends_with_one_message_and_exit_3(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / "rogue.toml"
+    file.write_text(SCENARIO)
+    words = ["simulate", str(file), "--set", f"behaviour={BEHAVIOURS[kind]}", "--timeout", "4", "--json"]
+    done = subprocess.run(
+        [sys.executable, "-c", "from foreshock.cli import main; main()", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 3
+    answer = json.loads(done.stdout)
+    assert answer["ok"] is False
+    assert answer["errors"][0]["kind"] == f"twin {kind}"
+
+
+def test_a_twin_whose_step_does_not_divide_the_tick_is_refused(scenario: Scenario) -> None:
+    config = {**scenario.config, "supervisor": {"period_s": 0.0015}}
+    with pytest.raises(ConfigError, match=r"period_s.*not a multiple"):
+        run_all(
+            [
+                Job(
+                    Scenario(**{f: getattr(scenario, f) for f in scenario.__struct_fields__} | {"config": config}),
+                    "on",
+                    0,
+                )
+            ]
+        )
