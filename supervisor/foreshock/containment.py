@@ -263,7 +263,8 @@ class Contained:
         return Outcome("failed", reason)
 
     def _checked(self, said: object, now_ns: int) -> dict[Key, Indication]:
-        if isinstance(said, (str, bytes)) or not isinstance(said, Sequence):
+        # lists and tuples first: the test against the abstract class is slow
+        if not isinstance(said, (list, tuple)) and (isinstance(said, (str, bytes)) or not isinstance(said, Sequence)):
             raise TypeError(f"update() gave {type(said).__name__}, a sequence of Indication is expected")
         checked: dict[Key, Indication] = {}
         kinds, name = self.kinds, self.spec.id

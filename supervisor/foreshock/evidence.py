@@ -108,10 +108,11 @@ def step(
     span = round(window.length_s * 1e9) * (5 if window.kernel == "exponential" else 1)
     recur = round((window.recurrence_s or window.length_s) * 1e9)
     lost = frozenset(frozen)
+    before = evidence.tracks
     tracks: dict[Key, Track] = {}
     fresh: set[Key] = set()
     for key, seen in observed.items():
-        old = evidence.tracks.get(key)
+        old = before.get(key)
         if old is None:
             if not seen.present:
                 continue
@@ -129,7 +130,7 @@ def step(
             tracks[key] = _present(old, seen, local, recur)
         else:
             tracks[key] = msgspec.structs.replace(old, present=False, seen=seen)
-    for key, old in evidence.tracks.items():
+    for key, old in before.items():
         if key in tracks:
             continue
         if key[2] not in lost and carried is not None and key in carried:

@@ -166,10 +166,11 @@ class Arbiter:
         An engaged action is kept. A mitigation stands only when nothing new can prevent the accident any more and no
         more time is left than the mitigation itself needs.
         """
-        committed = [p for p in proposals if self._committed(state, p.action, now_ns)]
-        if time_to_event_s is None:
-            return [p for p in proposals if not self.actions[p.action].mitigates] + committed
+        mitigate = [p for p in proposals if self.actions[p.action].mitigates]
         prevent = [p for p in proposals if not self.actions[p.action].mitigates]
+        committed = [p for p in mitigate if self._committed(state, p.action, now_ns)]
+        if time_to_event_s is None:
+            return prevent + committed
         keep = [
             p
             for p in prevent
@@ -182,19 +183,11 @@ class Arbiter:
             for p in keep
         )
         if not hope:
-            keep += [
-                p
-                for p in proposals
-                if self.actions[p.action].mitigates
-                and p not in committed
-                and time_to_event_s <= self.actions[p.action].duration_s
-            ]
+            keep += [p for p in mitigate if p not in committed and time_to_event_s <= self.actions[p.action].duration_s]
         return keep + committed
 
     def _committed(self, state: ArbiterState, action: str, now_ns: int) -> bool:
         """Whether a mitigation has begun so lately that it is not given up: a prediction at its edge flickers."""
-        if not self.actions[action].mitigates:
-            return False
         since = state.engaged_ns.get(action)
         return since is not None and action not in state.releasing and now_ns - since < MITIGATION_NS
 
@@ -203,13 +196,13 @@ class Arbiter:
 
         Proposals of one action are one, at the highest level and strength that any of them asks for.
         """
-        if len(proposals) <= 1:
-            return list(proposals)
-        merged: dict[str, Proposal] = {}
-        for p in sorted(proposals, key=lambda p: (p.action, -p.level, -p.strength, p.mode, p.rule)):
-            first = merged.setdefault(p.action, p)
-            if p.strength > first.strength:
-                merged[p.action] = msgspec.structs.replace(first, strength=p.strength)
+        merged = {p.action: p for p in proposals}
+        if len(merged) < len(proposals):
+            merged.clear()
+            for p in sorted(proposals, key=lambda p: (p.action, -p.level, -p.strength, p.mode, p.rule)):
+                first = merged.setdefault(p.action, p)
+                if p.strength > first.strength:
+                    merged[p.action] = msgspec.structs.replace(first, strength=p.strength)
 
         def rank(p: Proposal) -> tuple[bool, int, bool, float, str]:
             spec = self.actions[p.action]
@@ -250,10 +243,9 @@ class Arbiter:
             active[p.action] = held
             engaged[p.action] = state.engaged_ns.get(p.action, now)
         releasing: dict[str, tuple[int, float]] = {}
-        taken = {r: a for a in active for r in self.actions[a].resources}
-        for action, held in state.active.items():
-            if action in active:
-                continue
+        leaving = [(action, held) for action, held in state.active.items() if action not in active]
+        taken = {r: a for a in active for r in self.actions[a].resources} if leaving else {}
+        for action, held in leaving:
             successors = sorted({taken[r] for r in self.actions[action].resources if r in taken})
             if successors:
                 reason = f"gives way to {', '.join(successors)}"

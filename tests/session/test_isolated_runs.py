@@ -27,7 +27,7 @@ expect = "open"
 duration_s = 0.1
 
 [twin]
-kind = "fmi"
+kind = "fmu"
 plant = "{ROGUE}"
 binding = "{ROGUE / "binding.toml"}"
 

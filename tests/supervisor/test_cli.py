@@ -34,7 +34,7 @@ def foreshock(*words: str) -> subprocess.CompletedProcess[str]:
         (("simulate", "a1-fall-onto-human", "--set", "mu_low"), "is not NAME=NUMBER"),
         (("simulate", "a1-fall-onto-human", "--set", "drop_m=0.1"), "did you mean 'drop_mu'"),
         (("simulate", "a1-fall-onto-human", "--policy", "lader"), "did you mean 'ladder'"),
-        (("simulate", "a1-fall-onto-human", "--twin", "fmu"), "did you mean 'fmi'"),
+        (("simulate", "a1-fall-onto-human", "--twin", "fmx"), "did you mean 'fmu'"),
         (("simulate", "a1-fall-onto-human", "--supervisor", "onn"), "'on', 'shadow', 'off'"),
         (("config", "check", "nowhere.toml"), "nowhere.toml"),
     ],

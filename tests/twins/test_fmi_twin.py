@@ -243,4 +243,4 @@ def test_everything_temporary_lies_in_scratch_and_cwd_is_kept(make_twin, tmp_pat
 
 def test_the_hook_offers_it():
     (spec,) = foreshock_twins()
-    assert (spec.id, spec.config, spec.build) == ("fmi", FmiTwinConfig, build_twin)
+    assert (spec.id, spec.config, spec.build) == ("fmu", FmiTwinConfig, build_twin)

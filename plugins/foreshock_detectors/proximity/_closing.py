@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from operator import mul
 
 from foreshock.clock import NS_PER_S
 
@@ -44,6 +45,7 @@ class ClosingSpeed:
             self.value_m_s = None
             return
         times = [(t - stamp_ns) / NS_PER_S for t, _ in samples]
-        mean_t, mean_d = sum(times) / n, sum(d for _, d in samples) / n
-        covariance = sum((t - mean_t) * (d - mean_d) for t, (_, d) in zip(times, samples, strict=True))
-        self.value_m_s = -covariance / sum((t - mean_t) ** 2 for t in times)
+        mean = sum(times) / n
+        offsets = [t - mean for t in times]
+        # the offsets sum to zero, so that the mean of the distances drops out of the covariance
+        self.value_m_s = -sum(map(mul, offsets, [d for _, d in samples])) / sum(map(mul, offsets, offsets))

@@ -24,10 +24,10 @@ class CapsuleKinematics:
     Attributes:
         origin: base position in odom (m).
         ends: both ends of each segment, shape (n, 2, 3), m.
-        placements: of the capsules, centred along their z axis: columns of the rotation, then the middle; (n, 4, 3), m.
-        velocities: of both ends, shape (n, 2, 3), m/s. It and axes are laid out in memory with the capsules last, so that
-            numpy's inner loops run over n rather than over three coordinates.
-        axes: the ends once more, in that layout.
+        placements: of the capsules, centred along their z axis: columns of the rotation, then the middle, (n, 4, 3), m.
+        axes: the ends once more, laid out in memory with the capsules last, so that numpy's inner loops run over n
+            rather than over three coordinates.
+        velocities: of both ends, shape (n, 2, 3), m/s, in the same layout.
         length2: squared length of each segment, shape (n,), m^2; 1e-30 for a ball.
         half_m: half the length of each segment (m).
         radius: shape (n,), m; grows where a merged joint is beyond the range that its capsule covers.
@@ -43,12 +43,15 @@ class CapsuleKinematics:
         self._joint = np.array([robot.model.getJointId(c.joint) for c in capsules], dtype=np.intp)
         ends = np.array([(c.a, c.b) for c in capsules])
         places, half = capsule_placements(ends)
-        # rows of homogeneous coordinates in the joint's frame, 1 for points and 0 for directions
-        self._local = np.zeros((n, 6, 4))
-        self._local[:, :4, :3], self._local[:, 4:, :3] = places, ends
-        self._local[:, 3:, 3] = 1.0
-        self._moved = np.zeros((n, 6, 3))
-        self.placements, self._ends = self._moved[:, :4], self._moved[:, 4:]
+        # homogeneous coordinates in the joint's frame, 1 for points and 0 for directions: the placement, the ends and,
+        # new at every instant, their velocities; all are turned to odom by one product
+        self._local, self._moved = np.zeros((n, 8, 4)), np.zeros((n, 8, 3))
+        self._local[:, :4, :3], self._local[:, 4:6, :3] = places, ends
+        self._local[:, 3:6, 3] = 1.0
+        self._rates = self._local[:, 6:, :3]
+        self.placements, self._ends, self._both = self._moved[:, :4], self._moved[:, 4:6], self._moved[:, 4:]
+        self._by_axis = np.zeros((4, 3, n)).transpose(2, 0, 1)
+        self.axes, self.velocities = self._by_axis[:, :2], self._by_axis[:, 2:]
         self._twist = np.zeros((n, 6, 6))  # (v, w) of the joint to both ends' velocities, in its axes
         for k, (a, b) in enumerate(ends):
             self._twist[k, :3, :3] = self._twist[k, 3:, :3] = np.eye(3)
@@ -61,7 +64,6 @@ class CapsuleKinematics:
         self.origin: Vec3 = (0.0, 0.0, 0.0)
         self._places = np.zeros((n, 4, 3))
         self.ends = np.zeros((n, 2, 3))
-        self.axes, self.velocities = (np.zeros((2, 3, n)).transpose(2, 0, 1) for _ in range(2))
         self.radius, self.speed = self._fitted, np.zeros(n)
 
     def evaluate(self, joints: JointState, odometry: Odometry, odometry_lag_ns: int) -> None:
@@ -71,11 +73,11 @@ class CapsuleKinematics:
         q, v = vectors.q, vectors.v
         pin.forwardKinematics(self._model, arrays.data, q, v)
         places = arrays.placements.take(self._joint, 0, self._places, "clip")
+        rates = np.matmul(self._twist, arrays.velocities.take(self._joint, 0)[:, :, None])
+        self._rates[:] = rates.reshape(-1, 2, 3)
         np.matmul(self._local, places, self._moved)
         self.ends[:] = self._ends
-        self.axes[:] = self._ends
-        rates = np.matmul(self._twist, arrays.velocities.take(self._joint, 0)[:, :, None])
-        self.velocities[:] = np.matmul(rates.reshape(-1, 2, 3), places[:, :3])
+        self._by_axis[:] = self._both
         if self._reach is not None:
             self._widen(self._reach, q, v)
 

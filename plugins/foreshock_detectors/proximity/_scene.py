@@ -41,7 +41,7 @@ class Scene:
     def __init__(self, robot: Robot, person: Person) -> None:
         geometry: Any = pin.GeometryModel()
         n, k = len(robot.capsules), len(person.radius)
-        self._n, self._k = n, k
+        self._k = k
         _, half = capsule_placements(np.array([(c.a, c.b) for c in robot.capsules]))
         for i, c in enumerate(robot.capsules):
             shape = coal.Capsule(c.radius, 2.0 * half.item(i))
@@ -58,7 +58,9 @@ class Scene:
         self._radius: Array | None = None
         self._middle: Array = np.zeros((k, 3))
         self._stamp_ns = -1
-        self._found = ShapeArrays(geometry)
+        found = ShapeArrays(geometry)
+        self._data, self._places, self._humans = found.data, found.placements[:n], found.placements[n:]
+        self._middles = self._humans[:, 3]
         self.measure(person)
 
     def fits(self, person: Person) -> bool:
@@ -71,8 +73,8 @@ class Scene:
             return
         self._stamp_ns = person.stamp_ns
         places, half = capsule_placements(person.ends)
-        self._middle = places[:, 3]
-        self._found.placements[self._n :] = places
+        self._middle = places[:, 3].copy()
+        self._humans[:, :3] = places[:, :3]
         rows = zip(self._human_shapes, half.tolist(), person.radius.tolist(), strict=True)
         for shape, length, radius in rows:
             shape.halfLength, shape.radius = length, radius
@@ -88,9 +90,8 @@ class Scene:
             self._radius = body.radius
             for shape, radius in zip(self._robot_shapes, body.radius.tolist(), strict=True):
                 shape.radius = radius
-        found, n = self._found, self._n
-        found.placements[:n] = body.placements
-        np.add(self._middle, centre, out=found.placements[n:, 3])
-        index = pin.computeDistances(self._geometry, found.data)
+        self._places[:] = body.placements
+        np.add(self._middle, centre, out=self._middles)
+        index = pin.computeDistances(self._geometry, self._data)
         i, j = divmod(index, self._k)
-        return ClosestPair(i, j, found.data.distanceResults[index].getNearestPoint2())
+        return ClosestPair(i, j, self._data.distanceResults[index].getNearestPoint2())

@@ -45,7 +45,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not self.duration_s > 0.0:
             raise ConfigError(f"{self.id}: duration_s", f"{self.duration_s!r} is not a positive time")
         if not isinstance(self.twin.get("kind"), str):
-            raise ConfigError(f"{self.id}: twin.kind", "missing; it names a kind of twin, e.g. 'fmi'")
+            raise ConfigError(f"{self.id}: twin.kind", "missing; it names a kind of twin, e.g. 'fmu'")
 
     def supervisor(self) -> Config:
         """The supervisor's configuration, checked."""

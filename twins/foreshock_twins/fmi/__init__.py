@@ -1,4 +1,4 @@
-"""A co-simulation FMU as a twin: ``[twin] kind = "fmi"`` in a scenario. Importing this module does not import FMPy."""
+"""A co-simulation FMU as a twin: ``[twin] kind = "fmu"`` in a scenario. Importing this module does not import FMPy."""
 
 from __future__ import annotations
 
@@ -45,4 +45,4 @@ def build_twin(config: FmiTwinConfig, robot: str, scratch: Path) -> Twin:
 @hookimpl
 def foreshock_twins() -> Sequence[TwinSpec]:
     """The twin kind ``fmi``."""
-    return [TwinSpec(id="fmi", build=build_twin, config=FmiTwinConfig, summary="A co-simulation FMU, FMI 2.0 or 3.0")]
+    return [TwinSpec(id="fmu", build=build_twin, config=FmiTwinConfig, summary="A co-simulation FMU, FMI 2.0 or 3.0")]
