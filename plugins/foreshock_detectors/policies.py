@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import msgspec
 
+from foreshock.errors import ConfigError, nearest
 from foreshock.hookspecs import hookimpl
-from foreshock.policy import PolicySpec, Proposal, Situation
+from foreshock.policy import ACTIONS, PolicySpec, Proposal, Situation
 from foreshock.records import ProtectionLevel
+from foreshock.taxonomy import builtin_taxonomy
 
 __all__ = ["Ladder", "LadderConfig", "PaperGate", "PaperGateConfig"]
 
@@ -21,9 +23,16 @@ class PaperGateConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     mode: str = "A1"
 
+    def __post_init__(self) -> None:
+        builtin_taxonomy().mode(self.mode, "mode")
+
 
 class PaperGate:
-    """All four protocols at T < 0.3 (the protective gate), nothing before: the paper as written."""
+    """All four protocols at T < 0.3 (the protective gate), nothing before, as in section 3.3.
+
+    What the arbiter withholds from any policy it withholds here too: a protocol that takes longer than the predicted
+    time to the fall is not begun.
+    """
 
     def __init__(self, config: PaperGateConfig) -> None:
         self._mode = config.mode
@@ -55,6 +64,20 @@ class LadderConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stop_trust: float = 0.3
     slowest: float = 0.1
 
+    def __post_init__(self) -> None:
+        builtin_taxonomy().mode(self.mode, "mode")
+        if not 0.0 <= self.slowest < 1.0:
+            raise ConfigError(
+                "slowest", f"{self.slowest!r} is not a share of full speed", "; expected 0 <= slowest < 1"
+            )
+        if not 0.0 <= self.stop_trust < self.full_speed_trust <= 1.0:
+            limits = f"stop_trust {self.stop_trust!r} < full_speed_trust {self.full_speed_trust!r}"
+            raise ConfigError("full_speed_trust", f"{limits} must hold within 0..1")
+        for name, actions in (("caution", self.caution), ("protective", self.protective)):
+            for action in actions:
+                if action not in ACTIONS:
+                    raise ConfigError(name, f"unknown action {action!r}", nearest(action, ACTIONS))
+
 
 class Ladder:
     """Speed scale from overall trust, cheap actions at the caution gate, all protocols at the protective gate."""
@@ -66,7 +89,7 @@ class Ladder:
         """What holds now; the speed scale never rises when trust falls."""
         c, proposals = self._c, []
         scale = self.speed(situation.overall)
-        if scale < 1.0:
+        if not scale >= 1.0:
             rule = f"speed scaled to {scale:.2f} by overall trust"
             proposals.append(Proposal("speed-scale", 1.0 - scale, situation.overall_level, "", rule))
         level = situation.levels.get(c.mode, ProtectionLevel.MINIMAL_RISK)

@@ -35,7 +35,7 @@ T = TypeVar("T", bound=_Named)
 
 
 class Broken(msgspec.Struct, frozen=True):
-    """A plugin that could not be loaded, and why."""
+    """A plugin that could not be loaded, or one of whose files could not, and why."""
 
     name: str
     reason: str
@@ -129,18 +129,24 @@ class Registry:
         """Scenario files of the loaded plugins, sorted."""
         return tuple(sorted(path for _, path in self._call("foreshock_scenarios", Path)))
 
+    def scenario_files(self) -> tuple[tuple[tuple[str, Path], ...], tuple[Broken, ...]]:
+        """Scenario files of the loaded plugins as (plugin, file), sorted; and the plugins whose hook breaks its contract.
+
+        Unlike :meth:`scenarios`, a plugin that fails hides no other.
+        """
+        files: list[tuple[str, Path]] = []
+        broken: list[Broken] = []
+        for impl in self._manager.hook.foreshock_scenarios.get_hookimpls():
+            try:
+                files += [(impl.plugin_name, path) for path in _given(impl, "foreshock_scenarios", Path)]
+            except PluginError as e:
+                broken.append(Broken(impl.plugin_name, str(e)))
+        return tuple(sorted(files)), tuple(sorted(broken, key=lambda b: b.name))
+
     def _call(self, hook: str, of: type) -> Iterable[tuple[str, Any]]:
         """What each plugin's implementation gives; called one by one, since pluggy stops at the first that raises."""
         for impl in getattr(self._manager.hook, hook).get_hookimpls():
-            try:
-                given = tuple(impl.function())
-            except Exception as e:
-                raise PluginError(f"plugin {impl.plugin_name}", f"{hook} raised {type(e).__name__}: {e}") from e
-            for item in given:
-                if not isinstance(item, of):
-                    raise PluginError(
-                        f"plugin {impl.plugin_name}", f"{hook} gave a {type(item).__name__}, {of.__name__} is expected"
-                    )
+            for item in _given(impl, hook, of):
                 yield impl.plugin_name, item
 
     def _sorted(self, hook: str, of: type) -> tuple[Any, ...]:
@@ -158,6 +164,23 @@ class Registry:
                 raise PluginError(f"plugin {name}", f"unknown hook {attr!r}", nearest(attr, known))
             if attr in known and not hasattr(getattr(module, attr), f"{GROUP}_impl"):
                 raise PluginError(f"plugin {name}", f"hook {attr!r} lacks @hookimpl")
+
+
+def _given(impl: pluggy.HookImpl, hook: str, of: type) -> tuple[Any, ...]:
+    """What one plugin's implementation gives.
+
+    Raises:
+        PluginError: it raises, or gives something of another type.
+    """
+    try:
+        given = tuple(impl.function())
+    except Exception as e:
+        raise PluginError(f"plugin {impl.plugin_name}", f"{hook} raised {type(e).__name__}: {e}") from e
+    for item in given:
+        if not isinstance(item, of):
+            problem = f"{hook} gave a {type(item).__name__}, {of.__name__} is expected"
+            raise PluginError(f"plugin {impl.plugin_name}", problem)
+    return given
 
 
 def _pick(specs: Iterable[T], id_: str, place: str, what: str) -> T:

@@ -14,9 +14,10 @@ from typing import Any
 
 import msgspec
 
+from foreshock._strict import convert, read_toml
 from foreshock.errors import ConfigError, nearest
 
-__all__ = ["AccidentMode", "PrecursorClass", "PrecursorKind", "Taxonomy", "builtin_taxonomy"]
+__all__ = ["AccidentMode", "Extension", "PrecursorClass", "PrecursorKind", "Taxonomy", "builtin_taxonomy"]
 
 
 class PrecursorClass(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -69,6 +70,12 @@ class PrecursorKind(msgspec.Struct, frozen=True, forbid_unknown_fields=True, ren
     source: str
     modes: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
+
+
+class Extension(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A TOML file with further precursor kinds."""
+
+    kinds: tuple[PrecursorKind, ...]
 
 
 class Taxonomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, dict=True):
@@ -147,14 +154,7 @@ class Taxonomy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, dict=Tru
         Raises:
             ConfigError: the file is missing, is not TOML, or its kinds do not fit.
         """
-
-        class Extension(msgspec.Struct, forbid_unknown_fields=True):
-            kinds: tuple[PrecursorKind, ...]
-
-        try:
-            extension = msgspec.convert(tomllib.loads(path.read_text()), Extension)
-        except (OSError, tomllib.TOMLDecodeError, msgspec.ValidationError) as e:
-            raise ConfigError(str(path), str(e)) from None
+        extension = convert(read_toml(path), Extension, str(path))
         return self.extended(extension.kinds, str(path))
 
     def check(self, place: str) -> Taxonomy:

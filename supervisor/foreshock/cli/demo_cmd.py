@@ -67,7 +67,9 @@ def cells(seeds: int, per_cell: int) -> list[Cell]:
     show_default=True,
     help="Folder for report and pictures.",
 )
-@click.option("--seed", type=int, default=FIRST_SEED, show_default=True, help="Of the three runs that are shown.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=FIRST_SEED, show_default=True, help="Of the three runs that are shown."
+)
 @click.option(
     "--seeds", type=click.IntRange(1), default=50, show_default=True, help="Runs per arm at default parameters."
 )
@@ -80,6 +82,7 @@ def demo(out: Path, seed: int, seeds: int, per_cell: int, workers: int, as_json:
         from foreshock.report import runs_figure, sweep_figure, write_report
     except ImportError as e:
         raise BadInputError("demo", f"the report needs {e.name}", "; run: pip install 'foreshock[report]'") from e
+    out.mkdir(parents=True, exist_ok=True)
     scenario = find_scenario(SCENARIO, Registry())
     shown = _three(scenario, seed)
     if not as_json:
@@ -105,7 +108,6 @@ def demo(out: Path, seed: int, seeds: int, per_cell: int, workers: int, as_json:
             bar.update(task, advance=1, failed=failed)
 
         results = sweep(scenario, ARMS, points, workers, done)
-    out.mkdir(parents=True, exist_ok=True)
     command = f"foreshock demo --seed {seed} --seeds {seeds} --per-cell {per_cell}"
     write_report(out / "report.html", "A1: fall onto human", shown, results, NOTES, command)
     runs_figure(shown).savefig(out / "runs.png", dpi=110)

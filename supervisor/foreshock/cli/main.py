@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import traceback
 
 import click
+from rich.markup import escape
 
 from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
@@ -65,9 +68,15 @@ def main(args: list[str] | None = None) -> None:
         code, kind, message = FAILED, f"twin {e.kind}", str(e)
     except ForeshockError as e:
         code, kind, message = FAILED, type(e).__name__, str(e)
+    except OSError as e:
+        code, kind, message = BAD_INPUT, type(e).__name__, f"{e.filename or 'file'}: {e.strerror or e}"
+    except Exception as e:  # noqa: BLE001 # the last resort of the program: a user gets one line, not a traceback
+        code, kind, message = FAILED, "internal", f"internal failure: {type(e).__name__}: {e}"
+        if os.environ.get("FORESHOCK_TRACEBACK"):
+            traceback.print_exc()
     if message:
         if as_json:
             emit(None, [{"kind": kind, "message": message}])
         else:
-            notes.print(f"[bold red]error:[/] {message.replace('[', chr(92) + '[')}", soft_wrap=True)
+            notes.print(f"[bold red]error:[/] {escape(message)}", soft_wrap=True)
     sys.exit(code)

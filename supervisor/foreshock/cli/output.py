@@ -13,6 +13,7 @@ from typing import Any
 
 import msgspec
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 __all__ = ["BAD_INPUT", "FAILED", "NEGATIVE", "OK", "console", "emit", "notes", "table"]
@@ -46,9 +47,9 @@ def emit(result: Any, errors: list[dict[str, str]] | None = None) -> None:
 
 def table(title: str, *columns: str, rows: Sequence[tuple[str, ...]], right: tuple[str, ...] = ()) -> None:
     """Print a table; the columns named in right are aligned to it."""
-    t = Table(title=title, title_justify="left", title_style="bold", header_style="bold", pad_edge=False)
+    t = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", pad_edge=False)
     for c in columns:
         t.add_column(c, justify="right" if c in right else "left", overflow="fold")
     for row in rows:
-        t.add_row(*row)
+        t.add_row(*(escape(cell) for cell in row))
     console.print(t)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import get_args
 
 import click
 import msgspec
+from rich.markup import escape
 from rich.progress import Progress
 
 from foreshock.cli.output import OK, console, emit, notes, table
@@ -44,12 +46,16 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
     help="Judges and acts, judges only, or off.",
 )
 @click.option("--policy", help="Use this policy instead of the scenario's.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of all randomness.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of all randomness.")
 @click.option(
     "--set", "parameters", multiple=True, callback=_values, metavar="NAME=NUMBER", help="Set a parameter of the twin."
 )
 @click.option("--duration", type=float, help="Simulated time in s; the scenario's own by default.")
-@click.option("--timeout", type=float, default=120.0, show_default=True, help="Wall-clock limit in s.")
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0.0, min_open=True),
+    help="Wall-clock limit in s; 60 s and ten times the duration by default.",
+)
 @click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="Write an HTML report here.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def simulate(
@@ -60,7 +66,7 @@ def simulate(
     seed: int,
     parameters: dict[str, float],
     duration: float | None,
-    timeout: float,
+    timeout: float | None,
     report: Path | None,
     as_json: bool,
 ) -> int:
@@ -100,25 +106,36 @@ def timeline(run: Run, title: str = "") -> None:
         (
             f"{r.t_s:.3f}",
             ", ".join(r.precursors),
-            f"{r.m:g}",
-            f"{r.q:g}",
-            f"{r.probability:.3f}",
-            f"{r.trust:.3f}",
+            *(_number(x) for x in (r.m, r.q)),
+            *(_number(x, 3) for x in (r.probability, r.trust, r.control_trust)),
             r.level,
             "; ".join((*(f"» {e}" for e in r.events), *r.interventions)),
         )
         for r in run.timeline
     ]
-    columns = ("t (s)", "precursors", "m", "q", "P", "T", "level", "interventions, » events")
+    columns = ("t (s)", "precursors", "m", "q", "P", "T", "control", "level", "interventions, » events")
     name = title or f"{run.scenario}: supervisor {run.supervisor}" + (f" ({run.policy})" if run.policy else "")
-    table(name, *columns, rows=rows, right=("t (s)", "m", "q", "P", "T"))
+    table(name, *columns, rows=rows, right=("t (s)", "m", "q", "P", "T", "control"))
+
+
+def _number(x: float, digits: int | None = None) -> str:
+    """A number, or nothing where there is none: without a supervisor there is no P."""
+    return "" if math.isnan(x) else f"{x:g}" if digits is None else f"{x:.{digits}f}"
 
 
 def summary(run: Run) -> str:
-    """One line on the outcome."""
-    colour = "red" if run.accident else "green"
+    """What happened, what was not observed, and what the twin ignored; with markup."""
+    colour = "red" if run.accident else "yellow" if run.events else "green"
     what = "; ".join(
-        f"{e.id} at {e.stamp_ns / 1e9:.3f} s" + (f" with {e.value:.0f} {e.unit} (limit {e.limit:g})" if e.limit else "")
+        f"{e.id} at {e.stamp_ns / 1e9:.3f} s" + (f" with {e.value:.0f} {e.unit} (limit {e.limit:g})" if e.mode else "")
         for e in run.events
     )
-    return f"[{colour}]outcome: {run.outcome}[/]" + (f": {what}" if what else " happened") + f"; seed {run.seed}"
+    outcome = f"[{colour}]outcome: {escape(run.outcome)}[/]"
+    lines = [f"{outcome}{escape(': ' + what if what else ', nothing happened')}; seed {run.seed}"]
+    lost = [h for h in run.health if h.state not in ("ok", "warm-up")]
+    lines += [f"[yellow]{escape(f'{h.source} {h.state} at {h.stamp_ns / 1e9:.3f} s: {h.reason}')}[/]" for h in lost[:8]]
+    if len(lost) > 8:
+        lines.append(f"[yellow]and {len(lost) - 8} more changes of health; see --json[/]")
+    if run.ignored:
+        lines.append(f"[dim]the twin has no input for: {escape(', '.join(run.ignored))}[/]")
+    return "\n".join(lines)

@@ -22,7 +22,7 @@ import msgspec
 from pebble import ProcessExpired, ProcessPool
 
 from foreshock._strict import convert
-from foreshock.errors import TwinError
+from foreshock.errors import ForeshockError, TwinError
 from foreshock.registry import Registry
 from foreshock.session.run import Arm, Run
 from foreshock.session.scenario import Scenario
@@ -108,7 +108,7 @@ def _scratch() -> Iterator[Path]:
 def run_all(
     jobs: Sequence[Job],
     workers: int = 1,
-    timeout_s: float = 120.0,
+    timeout_s: float | None = None,
     done: Callable[[int, Run | Failure], None] | None = None,
 ) -> list[Run | Failure]:
     """Do all jobs; results in their order.
@@ -116,7 +116,8 @@ def run_all(
     Args:
         jobs: what to run.
         workers: number of processes.
-        timeout_s: wall-clock limit of one run; beyond it the worker is killed.
+        timeout_s: wall-clock limit of one run, beyond which its worker is killed; by default 60 s and ten times the
+            simulated time.
         done: told of each result as it comes, with its index.
 
     Raises:
@@ -128,9 +129,13 @@ def run_all(
             max_workers=workers, context=get_context("spawn"), initializer=_quiet, initargs=[str(scratch)]
         )
         try:
-            futures = [pool.schedule(_work, args=[job, str(scratch)], timeout=timeout_s) for job in jobs]
-            for k, (job, future) in enumerate(zip(jobs, futures, strict=True)):
-                result = _result(job, future, timeout_s, scratch)
+            limits = [60.0 + 10.0 * job.scenario.duration_s if timeout_s is None else timeout_s for job in jobs]
+            futures = [
+                pool.schedule(_work, args=[job, str(scratch)], timeout=limit)
+                for job, limit in zip(jobs, limits, strict=True)
+            ]
+            for k, (job, future, limit) in enumerate(zip(jobs, futures, limits, strict=True)):
+                result = _result(job, future, limit, scratch)
                 results.append(result)
                 if done is not None:
                     done(k, result)
@@ -145,13 +150,18 @@ def _result(job: Job, future: Any, timeout_s: float, scratch: Path) -> Run | Fai
     try:
         run: Run = future.result()
     except FutureTimeout:
-        return Failure(job, "hang", f"no result within {timeout_s:g} s; killed", _last_words(scratch))
+        late = f"no result within {timeout_s:g} s: hung, or slow (then raise the limit); killed"
+        return Failure(job, "hang", late, _last_words(scratch))
     except ProcessExpired as e:
         code = e.exitcode
         how = signal.Signals(-code).name if isinstance(code, int) and code < 0 else f"exit code {code}"
         return Failure(job, "crash", f"the process of the twin ended by {how}", _last_words(scratch))
     except TwinError as e:
         return Failure(job, e.kind, e.detail, e.log)
+    except ForeshockError:
+        raise
+    except Exception as e:  # noqa: BLE001 # whatever ends one run must not end the others
+        return Failure(job, "error", f"{type(e).__name__}: {e}", _last_words(scratch))
     return run
 
 
@@ -161,7 +171,7 @@ def _last_words(scratch: Path, most: int = 4000) -> str:
     return "\n".join(text for p in logs[-3:] if (text := p.read_text(errors="replace")[-most:].strip()))
 
 
-def run_one(job: Job, timeout_s: float = 120.0) -> Run:
+def run_one(job: Job, timeout_s: float | None = None) -> Run:
     """Do one job in a watched process.
 
     Raises:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
 
-from foreshock._strict import convert, read_toml
+from foreshock._strict import convert, read_toml, within
 from foreshock.config import Config, parse_config
-from foreshock.errors import ConfigError, nearest
-from foreshock.registry import Registry
+from foreshock.errors import ConfigError, ForeshockError, nearest
+from foreshock.registry import Broken, Registry
+from foreshock.taxonomy import builtin_taxonomy
 
-__all__ = ["Scenario", "find_scenario", "load_scenario", "scenario_ids"]
+__all__ = ["Scenario", "broken_scenarios", "find_scenario", "load_scenario", "scenario_ids"]
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -22,12 +24,12 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         id: e.g. ``a1-fall-onto-human``.
         title: one line for people.
-        mode: accident mode that it is about.
+        mode: code of the accident mode that it is about.
         expect: what happens when unsupervised: ``accident``, ``none`` or ``open``.
-        duration_s: simulated time.
+        duration_s: simulated time, finite and above 0.
         twin: kind of twin (``kind``) and its settings.
         config: the supervisor's configuration, inline.
-        parameters: values of the twin's parameters, where they differ from its defaults.
+        parameters: values of the twin's parameters, where they differ from its defaults; finite.
         folder: where the file lies; relative paths start there.
     """
 
@@ -42,8 +44,14 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     folder: str = ""
 
     def __post_init__(self) -> None:
-        if not self.duration_s > 0.0:
-            raise ConfigError(f"{self.id}: duration_s", f"{self.duration_s!r} is not a positive time")
+        within(f"{self.id}: duration_s", self.duration_s, 0.0, above=True)
+        codes = builtin_taxonomy().codes
+        if self.mode not in codes:
+            hint = nearest(self.mode, codes)
+            raise ConfigError(f"{self.id}: mode", f"{self.mode!r} is not the code of an accident mode", hint)
+        for name, value in self.parameters.items():
+            if not math.isfinite(value):
+                raise ConfigError(f"{self.id}: parameters.{name}", f"{value!r} is not a finite number")
         if not isinstance(self.twin.get("kind"), str):
             raise ConfigError(f"{self.id}: twin.kind", "missing; it names a kind of twin, e.g. 'fmu'")
 
@@ -70,31 +78,55 @@ def load_scenario(path: Path) -> Scenario:
     return convert(data, Scenario, str(path))
 
 
-def _by_id(paths: Iterable[Path]) -> dict[str, Scenario]:
-    found: dict[str, Scenario] = {}
-    for path in paths:
-        scenario = load_scenario(path)
-        if scenario.id in found:
-            raise ConfigError(str(path), f"scenario id {scenario.id!r} is taken by {found[scenario.id].folder}")
-        found[scenario.id] = scenario
-    return found
-
-
 def scenario_ids(registry: Registry) -> dict[str, Scenario]:
-    """All scenarios of the installed plugins, by id."""
-    registry.load_all()
-    return dict(sorted(_by_id(registry.scenarios()).items()))
+    """All scenarios of the installed plugins that can be read, by id."""
+    return _sifted(registry)[0]
+
+
+def broken_scenarios(registry: Registry) -> tuple[Broken, ...]:
+    """Plugins and what is wrong with a scenario file of theirs, or with their list of files; one entry for each."""
+    return _sifted(registry)[1]
 
 
 def find_scenario(name: str, registry: Registry) -> Scenario:
     """The scenario with this id, or in this TOML file.
 
     Raises:
-        ConfigError: there is none; the nearest ids are named.
+        ConfigError: there is none; the nearest ids are named, and all that could not be read: it may be among them.
     """
     if name.endswith(".toml"):
         return load_scenario(Path(name))
-    known = scenario_ids(registry)
+    known, broken = _sifted(registry)
     if name not in known:
-        raise ConfigError("scenario", f"no scenario {name!r}", nearest(name, known))
+        left_out = "".join(f"\nplugin {b.name} is left out: {b.reason}" for b in (*registry.load_all(), *broken))
+        raise ConfigError("scenario", f"no scenario {name!r}", nearest(name, known) + left_out)
     return known[name]
+
+
+def _sifted(registry: Registry) -> tuple[dict[str, Scenario], tuple[Broken, ...]]:
+    """The scenarios by id, and what is left out.
+
+    An id that two files claim is left out as well: whichever ran, it might not be the one that was meant.
+    """
+    registry.load_all()
+    files, failed = registry.scenario_files()
+    broken = list(failed)
+    found: dict[str, dict[Path, tuple[str, Scenario]]] = {}
+    for plugin, path in files:
+        try:
+            scenario = load_scenario(path)
+        except (ForeshockError, OSError, ValueError) as e:  # a path may hold what the file system refuses
+            broken.append(Broken(plugin, str(e)))
+        else:
+            # A plugin with several names gives one file several times.
+            found.setdefault(scenario.id, {}).setdefault(path.resolve(), (plugin, scenario))
+    known: dict[str, Scenario] = {}
+    for id_, claims in sorted(found.items()):
+        if len(claims) == 1:
+            known[id_] = next(iter(claims.values()))[1]
+            continue
+        where = " and ".join(f"{path} of plugin {plugin}" for path, (plugin, _) in claims.items())
+        broken += [
+            Broken(p, f"scenario id {id_!r} is claimed by {where}") for p in sorted({p for p, _ in claims.values()})
+        ]
+    return known, tuple(broken)

@@ -133,7 +133,7 @@ class _Log:
     def tick(self, now_ns: int, decision: Decision | None, events: Sequence[TwinEvent], twin: Twin) -> None:
         """Take one tick."""
         t = seconds(now_ns)
-        news = tuple(f"{e.id} ({e.value:.0f} {e.unit})" if e.limit else e.id for e in events[self._events :])
+        news = tuple(f"{e.id} ({e.value:.0f} {e.unit})" if e.mode else e.id for e in events[self._events :])
         self._events = len(events)
         if decision is not None:
             self._judged(t, decision, news)
@@ -166,7 +166,9 @@ class _Log:
             shown = tuple(sorted(n if n in self._known else f"+{n}" for n in names))
             trust, control = d.trust.by_mode[mode], d.trust.control_by_mode[mode]
             p_mode = d.risk.by_mode[mode]
-            self.rows.append(TimelineRow(t, shown, m, q, p_mode, trust, control, level.name.lower(), changed, news))
+            self.rows.append(
+                TimelineRow(t, shown, m, q, p_mode, trust, control, level.name.lower().replace("_", "-"), changed, news)
+            )
         self._before, self._known = state, names
 
     def _sample(self, t: float, d: Decision | None, twin: Twin) -> None:

@@ -88,7 +88,7 @@ def sweep(
     cells: Sequence[Cell],
     workers: int,
     done: Callable[[int, Run | Failure], None] | None = None,
-    timeout_s: float = 120.0,
+    timeout_s: float | None = None,
 ) -> list[CellResult]:
     """Run every cell under every arm on the cell's seeds; the first arm is the reference.
 

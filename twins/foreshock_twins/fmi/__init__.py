@@ -34,7 +34,7 @@ def build_twin(config: FmiTwinConfig, robot: str, scratch: Path) -> Twin:
 
     Raises:
         BadInputError: the configuration, the FMU or the binding is wrong.
-        MissingExtraError: FMPy is not installed.
+        MissingExtraError: FMPy is not installed, or cannot be imported.
         TwinError: the FMU cannot be instantiated.
     """
     from foreshock_twins.fmi._build import build

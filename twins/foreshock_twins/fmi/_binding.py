@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import re
 from pathlib import Path
 from typing import Literal
 
@@ -9,12 +11,18 @@ import msgspec
 
 from foreshock.clock import ns
 from foreshock.errors import nearest
+from foreshock.policy import ACTIONS
+from foreshock.taxonomy import builtin_taxonomy
 from foreshock_fmus import TomlTable
 from foreshock_twins.fmi._channels import ChannelBinding, read_channel
 from foreshock_twins.fmi._layout import Item
 from foreshock_twins.fmi._variables import Variable, Variables
 
 __all__ = ["Binding", "Condition", "EventBinding", "InputTarget", "read_binding"]
+
+_KEBAB = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+# A similarity as difflib.SequenceMatcher.ratio gives it; above, a name counts as a known one misspelt.
+_MISSPELT = 0.75
 
 
 class InputTarget(msgspec.Struct, frozen=True):
@@ -102,13 +110,25 @@ def _parameter(table: TomlTable, key: str, variables: Variables) -> Variable:
 
 
 def _action(table: TomlTable, variables: Variables) -> tuple[str, tuple[InputTarget, ...]]:
-    action = table.text("action")
+    action = _action_id(table)
     inputs = table.table("inputs", required=True)
     targets = tuple(_target(inputs, name, variables) for name in inputs.names())
     if not targets:
         table.fail("inputs", "is empty", "; expected input = value at strength 1")
     table.done()
     return action, targets
+
+
+def _action_id(table: TomlTable) -> str:
+    """An action that Foreshock knows, or one of a policy plugin; misspelt, a protocol would never reach the plant."""
+    action = table.text("action")
+    if action in ACTIONS:
+        return action
+    if close := difflib.get_close_matches(action.lower(), sorted(ACTIONS), n=1, cutoff=_MISSPELT):
+        table.fail("action", f"{action!r} is not a known action", f"; did you mean {close[0]!r}?")
+    if not _KEBAB.fullmatch(action):
+        table.fail("action", f"{action!r} is not an action's id", "; expected one in kebab-case, e.g. 'balance-lock'")
+    return action
 
 
 def _target(table: TomlTable, name: str, variables: Variables) -> InputTarget:
@@ -131,7 +151,10 @@ def _event(table: TomlTable, variables: Variables) -> EventBinding:
     unit = table.text("unit", value.unit_name or "1")
     if value.unit_name and unit != value.unit_name:
         table.fail("unit", f"is {unit!r}", f"; variable {value.name!r} is in {value.unit_name!r}")
-    event = EventBinding(table.text("id"), table.text("mode", ""), when, value, table.number("limit"), unit)
+    mode, codes = table.text("mode", ""), builtin_taxonomy().codes
+    if mode and mode not in codes:
+        table.fail("mode", f"{mode!r} is not the code of an accident mode", nearest(mode, codes))
+    event = EventBinding(table.text("id"), mode, when, value, table.number("limit"), unit)
     table.done()
     return event
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import math
+import os
 import tempfile
 import zipfile
 from pathlib import Path
@@ -31,8 +32,7 @@ def build(config: FmiTwinConfig, robot: str, scratch: Path) -> FmuTwin:
     Raises:
         BadInputError: see foreshock_twins.fmi.build_twin.
     """
-    if importlib.util.find_spec("fmpy") is None:
-        raise MissingExtraError("twin fmi", "FMPy is not installed", '; pip install "foreshock[fmi]"')
+    _need_fmpy()
     fmu, binding_path = _files(config)
     description, folder = _open(fmu, scratch)
     variables = Variables(description, fmu.name)
@@ -40,8 +40,22 @@ def build(config: FmiTwinConfig, robot: str, scratch: Path) -> FmuTwin:
     _check_step(description, binding, binding_path)
     layout = Layout(binding.items())
     log = FmuLog(scratch / "fmu.log")
-    instance = FmuInstance(description, folder, layout, log)
+    instance = FmuInstance(description, fmu, folder, layout, log)
     return FmuTwin(robot, variables, binding, layout, instance, log)
+
+
+def _need_fmpy() -> None:
+    """Import what is used of FMPy, so that a missing or broken one is said before anything is built.
+
+    Raises:
+        MissingExtraError: an import fails, be it FMPy's own or that of a package which it needs.
+    """
+    try:
+        for module in ("fmpy", "fmpy.model_description", "fmpy.fmi2", "fmpy.fmi3"):
+            importlib.import_module(module)
+    except ImportError as error:
+        problem = f"needs fmpy, which cannot be imported: {error}"
+        raise MissingExtraError("twin fmu", problem, "; run: pip install 'foreshock[fmi]'") from error
 
 
 def _files(config: FmiTwinConfig) -> tuple[Path, Path]:
@@ -64,7 +78,7 @@ def _open(fmu: Path, scratch: Path) -> tuple[Any, Path]:
     import fmpy
     from fmpy.model_description import ValidationError
 
-    folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=scratch))
+    folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=scratch)).absolute()
     try:
         fmpy.extract(fmu, folder)
         description = fmpy.read_model_description(folder)
@@ -73,7 +87,7 @@ def _open(fmu: Path, scratch: Path) -> tuple[Any, Path]:
     except zipfile.BadZipFile as error:
         raise ConfigError(str(fmu), f"is no FMU: {error}") from None
     except Exception as error:  # noqa: BLE001 - FMPy raises plain Exception for most defects of an FMU
-        raise ConfigError(str(fmu), f"cannot be read: {error}") from None
+        raise ConfigError(str(fmu), f"cannot be read: {str(error).replace(f'{folder}{os.sep}', '')}") from None
     if description.fmiVersion != "2.0" and not description.fmiVersion.startswith("3.0"):
         raise ConfigError(str(fmu), f"is of FMI {description.fmiVersion}", "; expected 2.0 or 3.0")
     if description.coSimulation is None:

@@ -55,6 +55,7 @@ class FmuInstance:
 
     Args:
         description: FMPy's ModelDescription.
+        fmu: the user's file, for errors.
         folder: where the FMU is extracted.
         layout: what a step yields.
         log: takes what the FMU says.
@@ -64,8 +65,9 @@ class FmuInstance:
         TwinError: the FMU refuses to be instantiated.
     """
 
-    def __init__(self, description: Any, folder: Path, layout: Layout, log: FmuLog) -> None:
-        self._description, self._folder, self._layout, self._log = description, folder, layout, log
+    def __init__(self, description: Any, fmu: Path, folder: Path, layout: Layout, log: FmuLog) -> None:
+        self._description, self._fmu, self._folder = description, fmu, folder
+        self._layout, self._log = layout, log
         self._version: int = description.fmiMajorVersion
         self._fresh = False
         self._dead = True
@@ -180,7 +182,8 @@ class FmuInstance:
                 instanceName=identifier,
             )
         except Exception as error:  # noqa: BLE001 - FMPy raises plain Exception when a library does not load
-            raise ConfigError(f"FMU {identifier}", f"does not load: {error}", _platforms(self._folder)) from None
+            problem = f"does not load: {str(error).replace(f'{self._folder}{os.sep}', '').rstrip('.')}"
+            raise ConfigError(str(self._fmu), problem, _platforms(self._folder)) from None
         finally:
             os.chdir(cwd)
         try:
