@@ -7,31 +7,31 @@ the like are contained too (native bindings raise panics outside Exception); onl
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Mapping, Sequence
 
 import msgspec
 
 from foreshock._strict import within
+from foreshock.channels import AHEAD_NS, ChannelView
 from foreshock.clock import ns
 from foreshock.detector import Detector, DetectorSpec, Input, Inputs
 from foreshock.errors import nearest
 from foreshock.evidence import Key
-from foreshock.messages import is_finite
 from foreshock.policy import ActionSpec, Policy, Proposal, Situation
 from foreshock.records import ChannelState, Indication, ProtectionLevel, Sample, SampleRef
 from foreshock.taxonomy import Taxonomy
+from foreshock.verdicts import GAVE_UP, VERDICT, VerdictError
 
-__all__ = ["AHEAD_NS", "ChannelView", "Contained", "Outcome", "proposals_of"]
+__all__ = ["FAILURES_NS", "Contained", "Outcome", "proposals_of"]
 
-AHEAD_NS = 10_000_000
-"""A stamp further ahead of the tick than this is malformed; less is the skew of two synchronised clocks."""
+FAILURES_NS = 60_000_000_000
+"""Failures of a detector count together within this time of ticks: a crash loop gives up, a late verdict a week not."""
 
 
 def _said_by(e: BaseException) -> str:
-    """Type and message of an exception, even if its message cannot be had."""
+    """Type and message of an exception, even if its message cannot be had or holds what no journal can write."""
     try:
-        return f"{type(e).__name__}: {e}"
+        return f"{type(e).__name__}: {e}".encode("utf-8", "backslashreplace").decode()
     except Exception as worse:  # noqa: BLE001 # containment: the message is the plugin's code as well
         return f"{type(e).__name__} (its message raised {type(worse).__name__})"
 
@@ -72,89 +72,17 @@ class Outcome(msgspec.Struct, frozen=True):
         reason: why it is not ok.
         said: indications of this update; empty if it was not due or not ok.
         due: whether it was its turn.
+        judged: whether a verdict fell in this tick.
     """
 
     state: ChannelState
     reason: str = ""
     said: Mapping[Key, Indication] = {}
     due: bool = True
+    judged: bool = False
 
 
 NOT_DUE = Outcome("ok", due=False)
-
-
-class ChannelView:
-    """Newest valid sample of a channel, whether one was malformed, and its arrivals within a second.
-
-    Args:
-        needs: the inputs that read this channel.
-        queues: where each of them waits for new samples.
-    """
-
-    __slots__ = ("_queues", "_rated", "_type", "_types", "arrivals", "fault", "fault_ns", "latest")
-
-    def __init__(self, needs: Sequence[Input], queues: Sequence[list[Sample]]) -> None:
-        self._types = tuple({need.type: None for need in needs})
-        self._type = self._types[0] if len(self._types) == 1 else None
-        self._rated = any(need.min_rate_hz > 0 for need in needs)
-        self._queues = tuple(queues)
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget what was seen."""
-        self.latest: Sample | None = None
-        self.fault = ""
-        self.fault_ns = -1
-        self.arrivals: deque[int] = deque()
-
-    def take(self, sample: Sample, now_ns: int) -> bool:
-        """Give a sample to those who read the channel, if it is valid; a malformed one marks the channel.
-
-        A valid sample clears a fault of an earlier tick only: of two in one tick the malformed one is still a gap.
-        """
-        stamp_ns, value = sample.stamp_ns, sample.value
-        sound = type(stamp_ns) is int and stamp_ns <= now_ns + AHEAD_NS and type(value) is self._type
-        fault = "" if sound and is_finite(value) else self._fault_of(sample, now_ns)
-        if fault:
-            self.fault, self.fault_ns = fault, now_ns
-            return False
-        if self.fault and self.fault_ns < now_ns:
-            self.fault = ""
-        if self.latest is None or stamp_ns >= self.latest.stamp_ns:
-            self.latest = sample
-        if self._rated:
-            self.arrivals.append(now_ns)
-        for queue in self._queues:
-            queue.append(sample)
-        return True
-
-    def _fault_of(self, sample: Sample, now_ns: int) -> str:
-        if type(sample.stamp_ns) is not int:
-            return f"{sample.channel} has the stamp {sample.stamp_ns!r}, an int of nanoseconds is expected"
-        for wanted in self._types:
-            if not isinstance(sample.value, wanted):
-                return f"{sample.channel} carries {type(sample.value).__name__}, {wanted.__name__} is expected"
-        if not is_finite(sample.value):
-            return f"{sample.channel} carries a number that is not finite"
-        if sample.stamp_ns > now_ns + AHEAD_NS:
-            return f"{sample.channel} is stamped {(sample.stamp_ns - now_ns) / 1e6:.0f} ms ahead of the supervisor"
-        return ""
-
-    def lacks(self, need: Input, max_age_ns: int, now_ns: int, since_ns: int) -> str:
-        """Why the channel does not serve this input now; empty if it does."""
-        if self.fault:
-            return self.fault
-        if self.latest is None:
-            return f"no {need.type.__name__} on {need.channel} since reset"
-        age = now_ns - self.latest.stamp_ns
-        if age > max_age_ns:
-            return f"{need.channel} is {age / 1e6:.0f} ms old, at most {need.max_age_s * 1e3:.0f} ms is allowed"
-        if need.min_rate_hz > 0.0 and now_ns - since_ns >= 1_000_000_000:
-            while self.arrivals and self.arrivals[0] <= now_ns - 1_000_000_000:
-                self.arrivals.popleft()
-            if len(self.arrivals) < need.min_rate_hz:
-                return f"{need.channel} has {len(self.arrivals)} samples/s, {need.min_rate_hz:g} are needed"
-        return ""
 
 
 class Contained:
@@ -165,7 +93,7 @@ class Contained:
         detector: the object.
         inputs: its inputs with full channel names.
         taxonomy: to resolve aliases of kinds.
-        max_failures: after so many failures it stays failed until reset.
+        max_failures: after so many failures within FAILURES_NS it stays failed until reset.
     """
 
     def __init__(
@@ -188,39 +116,47 @@ class Contained:
         self._period_ns, self._warm_up_ns = ns(spec.period_s), ns(spec.warm_up_s)
         self._needs = tuple((i, ns(i.max_age_s)) for i in self.inputs if i.channel != "*")
         self.pending: dict[str, list[Sample]] = {i.name: [] for i in self.inputs}
+        self._failed_ns: tuple[int, ...] = ()
         self._start(0, 0)
 
     def _start(self, seed: int, now_ns: int) -> None:
-        self._seed, self._failures, self._why = seed, 0, ""
+        self._seed, self._why = seed, ""  # why: it was given up
         self._began_ns, self._due_ns = now_ns, now_ns
         for queue in self.pending.values():
             queue.clear()
 
     def reset(self, seed: int, now_ns: int = 0) -> str:
-        """Start anew; the reason if the detector fails to."""
+        """Start anew, with all failures forgotten; the reason if the detector fails to."""
+        self._failed_ns = ()
+        return self._restart(seed, now_ns)
+
+    def _restart(self, seed: int, now_ns: int) -> str:
         self._start(seed, now_ns)
         try:
             self.detector.reset(seed)
         except KeyboardInterrupt:
             raise
+        except VerdictError as e:
+            self._why = f"{VERDICT}{GAVE_UP}reset raised {e}"
         except BaseException as e:  # noqa: BLE001 # containment: whatever a plugin raises must not end the supervisor
-            self._failures, self._why = self._max_failures, f"reset raised {_said_by(e)}"
+            self._why = f"reset raised {_said_by(e)}"
         return self._why
 
-    def tick(self, now_ns: int, channels: Mapping[str, ChannelView], verdict: str = "") -> Outcome:
+    def tick(self, now_ns: int, channels: Mapping[str, ChannelView], verdict: str | None = None) -> Outcome:
         """Update the detector if it is due.
 
         Args:
             now_ns: time of the tick.
             channels: view of every channel by full name.
-            verdict: a recorded wall-clock verdict (late, hung) that makes it unobserved in this tick.
+            verdict: a recorded wall-clock verdict (late, hung) that makes it unobserved in this tick. One that begins
+                with ``gave up: `` ends it until reset: a child that could not be restarted.
         """
-        if self._failures >= self._max_failures:
+        if self._why:
             self._drop()
             return Outcome("failed", self._why)
-        if verdict:
+        if verdict is not None:
             self._drop()
-            return self._failed(verdict, now_ns)
+            return self._judged(verdict, now_ns)
         latest: dict[str, Sample] = {}
         for need, max_age_ns in self._needs:
             view = channels[need.channel]
@@ -241,6 +177,8 @@ class Contained:
             checked = self._checked(said, now_ns)
         except KeyboardInterrupt:
             raise
+        except VerdictError as e:
+            return self._judged(str(e), now_ns)
         except BaseException as e:  # noqa: BLE001 # containment, as above
             return self._failed(_said_by(e), now_ns)
         if now_ns - self._began_ns < self._warm_up_ns:
@@ -253,14 +191,26 @@ class Contained:
                 queue.clear()
 
     def _failed(self, reason: str, now_ns: int) -> Outcome:
-        """Count the failure and begin again, with warm-up; give up after too many."""
-        failures = self._failures + 1
+        """Count the failure and begin again, with warm-up; give up after too many within FAILURES_NS."""
+        self._failed_ns = (*(t for t in self._failed_ns if now_ns - t < FAILURES_NS), now_ns)
+        failures = len(self._failed_ns)
         if failures >= self._max_failures:
-            self._failures, self._why = failures, f"gave up after {failures} failures; the last: {reason}"
+            self._why = f"gave up after {failures} failures; the last: {reason}"
             return Outcome("failed", self._why)
-        self.reset(self._seed, now_ns)
-        self._failures = max(self._failures, failures)
+        self._restart(self._seed, now_ns)
+        if self._why.startswith(VERDICT):
+            # told in this very tick, since a replay takes all that happened in a tick from one verdict
+            self._why += f", after: {reason}"
+            return Outcome("failed", self._why, judged=True)
         return Outcome("failed", reason)
+
+    def _judged(self, verdict: str, now_ns: int) -> Outcome:
+        """A verdict is a failure that does not follow from what came in, and is named so that a replay can feed it."""
+        reason = VERDICT + verdict
+        if verdict.startswith(GAVE_UP):
+            self._why = reason
+            return Outcome("failed", reason, judged=True)
+        return msgspec.structs.replace(self._failed(reason, now_ns), judged=True)
 
     def _checked(self, said: object, now_ns: int) -> dict[Key, Indication]:
         # lists and tuples first: the test against the abstract class is slow

@@ -9,7 +9,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 
 import msgspec
 
-from foreshock.containment import ChannelView, Contained
+from foreshock.channels import ChannelView
+from foreshock.containment import Contained
 from foreshock.evidence import Evidence, Key
 from foreshock.records import ChannelState, Health, Indication
 
@@ -47,6 +48,7 @@ class Heard(msgspec.Struct, frozen=True):
         lost: detectors of which nothing is observed now.
         silent: declared kinds of which a detector does not speak, where there are any.
         health: of every detector.
+        judged: detectors on which a verdict fell in this tick.
     """
 
     observed: dict[Key, Indication]
@@ -55,6 +57,7 @@ class Heard(msgspec.Struct, frozen=True):
     lost: list[str]
     silent: dict[str, frozenset[str]]
     health: dict[str, tuple[ChannelState, str]]
+    judged: list[str]
 
 
 def listen(
@@ -73,14 +76,16 @@ def listen(
         verdicts: recorded wall-clock verdicts by detector id.
         now_ns: time of the tick.
     """
-    heard = Heard({}, {}, {}, [], {}, {})
+    heard = Heard({}, {}, {}, [], {}, {}, [])
     for d in detectors:
         name = d.spec.id
-        outcome = d.tick(now_ns, channels, verdicts.get(name, ""))
+        outcome = d.tick(now_ns, channels, verdicts.get(name))
         if outcome.state != "ok":
             heard.health[name] = (outcome.state, outcome.reason)
             heard.lost.append(name)
             heard.silent[name] = d.kinds
+            if outcome.judged:
+                heard.judged.append(name)
             continue
         heard.health[name] = OK
         if outcome.due:
@@ -136,9 +141,18 @@ def standing_predictions(
     return {**kept, **said} if kept else said
 
 
-def news(before: HealthMap, after: HealthMap, steady: Callable[[], Collection[str]], now_ns: int) -> tuple[Health, ...]:
-    """Health that changed; a reason that only counts on (an age) is not news, one of the steady names is."""
-    if before == after:
+def news(
+    before: HealthMap,
+    after: HealthMap,
+    steady: Callable[[], Collection[str]],
+    now_ns: int,
+    judged: Collection[str] = (),
+) -> tuple[Health, ...]:
+    """Health that changed; a reason that only counts on (an age) is not news, one of the steady names is.
+
+    A verdict is told even if the last tick ended in the same one: a replay needs both.
+    """
+    if before == after and not judged:
         return ()
     told = steady()
     changed = [
@@ -146,6 +160,7 @@ def news(before: HealthMap, after: HealthMap, steady: Callable[[], Collection[st
         for name, (state, reason) in after.items()
         if name not in before
         or before[name][0] != state
+        or name in judged
         or ((state == "ok" or name in told) and before[name][1] != reason)
     ]
     changed += [Health(now_ns, name, "ok") for name in before if name not in after]

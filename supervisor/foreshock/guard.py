@@ -2,20 +2,33 @@
 
 The guard sends a nonce and its own monotonic time; the supervisor echoes both in a Lease; motion is permitted until
 guard time + time to live. A delayed lease therefore never renews, and a higher epoch fences off an older supervisor.
+Since the supervisor says how long to live, the guard bounds it: a lease for years would outlive its supervisor.
 The control loop polls :meth:`MotionGuard.permitted`.
 """
 
 from __future__ import annotations
 
+from foreshock.errors import ConfigError
 from foreshock.records import Lease
 
 __all__ = ["MotionGuard"]
 
 
 class MotionGuard:
-    """Holds the lease in the robot's process. No I/O and no clock of its own: both are handed in."""
+    """Holds the lease in the robot's process. No I/O and no clock of its own: both are handed in.
 
-    def __init__(self) -> None:
+    Args:
+        max_ttl_ns: a lease that wants to live longer is refused. The robot moves for at most so long after its
+            supervisor died, so it belongs to the robot's safety case; 1 s is also what a Supervisor grants at most.
+
+    Raises:
+        ConfigError: max_ttl_ns is not a positive int.
+    """
+
+    def __init__(self, max_ttl_ns: int = 1_000_000_000) -> None:
+        if type(max_ttl_ns) is not int or max_ttl_ns <= 0:
+            raise ConfigError("guard.max_ttl_ns", f"{max_ttl_ns!r} is not a positive int of nanoseconds")
+        self._max_ttl_ns = max_ttl_ns
         self._epoch = -1
         self._nonce = 0
         self._asked: dict[int, int] = {}
@@ -30,8 +43,12 @@ class MotionGuard:
         return self._nonce, guard_ns
 
     def receive(self, lease: Lease) -> bool:
-        """Take a lease; False if it is not an answer to this guard, altered, or from a fenced-off supervisor."""
-        if lease.epoch < self._epoch or self._asked.get(lease.nonce) != lease.guard_ns or lease.ttl_ns <= 0:
+        """Take a lease; False if not an answer to this guard, altered, too long, or from a fenced-off supervisor."""
+        if any(type(x) is not int for x in (lease.epoch, lease.nonce, lease.guard_ns, lease.ttl_ns)):
+            return False  # a NaN would compare as neither older nor longer
+        if lease.epoch < self._epoch or self._asked.get(lease.nonce) != lease.guard_ns:
+            return False
+        if not 0 < lease.ttl_ns <= self._max_ttl_ns:
             return False
         self._epoch = lease.epoch
         self._until_ns = max(self._until_ns, lease.guard_ns + lease.ttl_ns)

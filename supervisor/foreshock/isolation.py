@@ -17,6 +17,7 @@ import msgspec
 from foreshock.detector import Detector, DetectorSpec, Inputs
 from foreshock.errors import MissingExtraError, PluginError
 from foreshock.records import Indication, Sample
+from foreshock.verdicts import VerdictError
 
 __all__ = ["ChildDetector", "ChildError"]
 
@@ -25,8 +26,11 @@ HANG_S = 1.0
 START_S = 60.0
 
 
-class ChildError(Exception):
-    """The child process hung, died, or raised."""
+class ChildError(VerdictError):
+    """The child process hung, died, raised, or answered what is no answer.
+
+    None of these follows from the samples alone, so containment records each as a verdict that a replay can feed.
+    """
 
 
 class _Reset(msgspec.Struct, frozen=True, tag=True):
@@ -176,6 +180,8 @@ class ChildDetector:
             reply = _REPLY.decode(self._pipe.recv_bytes())
         except (EOFError, OSError) as e:
             raise ChildError(self._end("died")) from e
+        except msgspec.DecodeError as e:
+            raise ChildError(f"answered what is no sequence of Indication: {e}") from e
         if isinstance(reply, _Raised):
             raise ChildError(reply.what)
         said: tuple[Indication, ...] = reply.indications

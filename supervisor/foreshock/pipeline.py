@@ -12,7 +12,8 @@ import msgspec
 
 from foreshock import coverage as cov
 from foreshock import evidence as ev
-from foreshock.containment import ChannelView, Contained, proposals_of
+from foreshock.channels import ChannelView, unread
+from foreshock.containment import Contained, proposals_of
 from foreshock.detector import Input
 from foreshock.errors import BadInputError, nearest
 from foreshock.policy import Arbiter, ArbiterState, Policy, Proposal, Situation
@@ -118,21 +119,33 @@ class Pipeline:
             verdicts: recorded wall-clock verdicts by detector id (late, hung).
 
         Raises:
-            BadInputError: a verdict on a detector that does not run.
+            BadInputError: a verdict on a detector that does not run, or one that is not a str.
         """
-        for name in verdicts or ():
+        for name, verdict in (verdicts or {}).items():
             if name not in self._ids:
                 raise BadInputError("verdicts", f"no detector {name!r} runs", nearest(name, self._ids))
+            if type(verdict) is not str:
+                raise BadInputError(f"verdicts.{name}", f"{verdict!r} is not a str")
+        malformed: dict[str, str] = {}
         for sample in samples:
-            view = self.channels.get(sample.channel)
-            if view is None or view.take(sample, now_ns):
-                for queue in self._everything:
-                    queue.append(sample)
+            # a channel of no type cannot even be looked up
+            view = self.channels.get(sample.channel) if type(getattr(sample, "channel", None)) is str else None
+            if view is None:
+                source, fault = unread(sample)
+                if fault:
+                    malformed[source] = fault
+                    continue
+            elif not view.take(sample, now_ns):
+                continue
+            for queue in self._everything:
+                queue.append(sample)
         heard = cov.listen(self.detectors, self.channels, state.carried, verdicts or {}, now_ns)
         health = heard.health
         for channel, view in self.channels.items():
             if view.fault:
                 health[channel] = ("failed", view.fault)
+        for source, fault in malformed.items():
+            health[source] = ("failed", fault)
         unobserved = cov.unobserved(heard, state.spoken)
         missing = state.missing
         if missing:
@@ -182,6 +195,7 @@ class Pipeline:
             health,
             lambda: {*partial, *(name for name in self._ids if health[name][0] == "failed")},
             now_ns,
+            heard.judged,
         )
         decision = Decision(
             now_ns,

@@ -130,7 +130,7 @@ class Registry:
         return tuple(sorted(path for _, path in self._call("foreshock_scenarios", Path)))
 
     def scenario_files(self) -> tuple[tuple[tuple[str, Path], ...], tuple[Broken, ...]]:
-        """Scenario files of the loaded plugins as (plugin, file), sorted; and the plugins whose hook breaks its contract.
+        """Scenario files of the loaded plugins as (plugin, file), sorted; and the plugins whose hook fails.
 
         Unlike :meth:`scenarios`, a plugin that fails hides no other.
         """
@@ -166,7 +166,7 @@ class Registry:
                 raise PluginError(f"plugin {name}", f"hook {attr!r} lacks @hookimpl")
 
 
-def _given(impl: pluggy.HookImpl, hook: str, of: type) -> tuple[Any, ...]:
+def _given(impl: Any, hook: str, of: type) -> tuple[Any, ...]:
     """What one plugin's implementation gives.
 
     Raises:

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import msgspec
 
-from foreshock._strict import convert
+from foreshock._strict import convert, within
 from foreshock.clock import NS_PER_S
 from foreshock.config import Config, DetectorEntry, load_config
 from foreshock.containment import Contained
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.errors import BadInputError, ConfigError, ForeshockError, MissingExtraError, PluginError, nearest
 from foreshock.isolation import ChildDetector
+from foreshock.journal import OperatorReset
 from foreshock.pipeline import Pipeline, State
 from foreshock.policy import ACTIONS, Arbiter
 from foreshock.records import Decision, Lease, ProtectionLevel, Sample
@@ -21,16 +22,15 @@ from foreshock.registry import Registry
 from foreshock.risk import IndependentRisk
 from foreshock.taxonomy import Taxonomy, builtin_taxonomy
 from foreshock.trust import LevelState, TrustModel
+from foreshock.verdicts import verdict_in
 
 __all__ = ["OperatorReset", "Supervisor", "build_detector"]
 
 
-class OperatorReset(msgspec.Struct, frozen=True):
-    """An operator's release of latched protection levels: when, who and why."""
-
-    stamp_ns: int
-    who: str
-    why: str
+MAX_TTL_S = 1.0
+"""A lease lives no longer: a robot at 1.5 m/s covers 1.5 m before it stops for a supervisor that died."""
+SILENT_PERIODS = 2
+"""A supervisor whose last tick is more periods old than this has stopped, and grants nothing."""
 
 
 class Supervisor:
@@ -40,12 +40,19 @@ class Supervisor:
         config: what to run.
         base: folder that relative paths of the configuration start from.
         registry: where plugins are looked up; the installed ones by default.
+        epoch: of its leases, 0 or more. A live supervisor must take one higher than every earlier one of the same
+            robot (its start time in ns), so that the robot-side guard fences off one that was replaced but still runs.
+            Two of the same epoch are not fenced from each other; 0 is for simulation and replay.
 
     Raises:
-        BadInputError: the configuration names something that does not exist or does not fit.
+        BadInputError: the configuration names something that does not exist or does not fit; epoch is no such int.
     """
 
-    def __init__(self, config: Config, base: Path | None = None, registry: Registry | None = None) -> None:
+    def __init__(
+        self, config: Config, base: Path | None = None, registry: Registry | None = None, *, epoch: int = 0
+    ) -> None:
+        if type(epoch) is not int or epoch < 0:
+            raise ConfigError("epoch", f"{epoch!r} is not an int of 0 or more", "; take the start time in ns")
         self.config = config
         registry = registry or Registry()
         specs = [registry.detector(d.use, f"detectors[{k}].use") for k, d in enumerate(config.detectors)]
@@ -76,14 +83,15 @@ class Supervisor:
         self.period_ns = round(config.supervisor.period_s * NS_PER_S)
         self.resets: list[OperatorReset] = []
         self._state = State()
-        self._epoch = 0
+        self._epoch = epoch
         self._may_move = False
+        self._stepped_ns = 0
         self.reset(0)
 
     @classmethod
-    def from_file(cls, path: Path, registry: Registry | None = None) -> Supervisor:
+    def from_file(cls, path: Path, registry: Registry | None = None, *, epoch: int = 0) -> Supervisor:
         """The supervisor that a TOML file describes."""
-        return cls(load_config(path), path.parent, registry)
+        return cls(load_config(path), path.parent, registry, epoch=epoch)
 
     @property
     def detectors(self) -> tuple[DetectorSpec, ...]:
@@ -102,27 +110,58 @@ class Supervisor:
         Args:
             samples: those that arrived since the last step, in order of arrival.
             now_ns: time of the tick, on the supervisor's timeline; it must not go backwards.
-            verdicts: recorded wall-clock verdicts (late, hung) by detector id.
+            verdicts: recorded wall-clock verdicts (late, hung) by detector id; in a replay, what verdicts_of() gave.
 
         Raises:
             ForeshockError: now_ns lies before the previous tick.
+            BadInputError: a verdict on a detector that does not run, or one that is not a str.
         """
+        self._may_move = False  # whatever raises below must not leave the last permission standing
         if now_ns < self._state.trust.at_ns:
             raise ForeshockError(f"time goes backwards: tick at {now_ns} ns after {self._state.trust.at_ns} ns")
         self._state, decision = self._pipeline.step(self._state, samples, now_ns, verdicts)
+        self._stepped_ns = now_ns
         self._may_move = decision.motion_permitted
         return decision
 
+    def verdicts_of(self, decision: Decision) -> dict[str, str]:
+        """What step() must be given as verdicts in a replay to decide the same without clocks and child processes.
+
+        Holds the verdicts that were passed in and those on children that hung, died or raised.
+        """
+        ids = {c.spec.id for c in self._pipeline.detectors}
+        found = {h.source: verdict_in(h.reason) for h in decision.health if h.source in ids and h.state == "failed"}
+        return {name: verdict for name, verdict in found.items() if verdict is not None}
+
     def operator_reset(self, who: str, why: str, now_ns: int) -> OperatorReset:
-        """Release latched levels; what still demands protection demands it again in the next tick. Recorded."""
+        """Release latched levels; what still demands protection demands it again in the next tick.
+
+        The record decides as samples do: whoever keeps a journal gives it to Journal.operator_reset.
+        """
         record = OperatorReset(now_ns, who, why)
         self.resets.append(record)
         self._state = msgspec.structs.replace(self._state, overall=LevelState(), levels={})
         return record
 
-    def lease(self, nonce: int, guard_ns: int, ttl_s: float = 0.1) -> Lease | None:
-        """Permission to move, in answer to a guard's request; None in warm-up or at minimal risk."""
-        return Lease(self._epoch, nonce, guard_ns, round(ttl_s * NS_PER_S)) if self._may_move else None
+    def lease(self, nonce: int, guard_ns: int, now_ns: int, ttl_s: float = 0.1) -> Lease | None:
+        """Permission to move, in answer to a guard's request.
+
+        None in warm-up, at minimal risk, after a step that raised, and when the supervisor has stopped stepping: its
+        last tick is more than two periods before now_ns, or after it (another timeline).
+
+        Args:
+            nonce: of the request.
+            guard_ns: of the request, on the guard's clock.
+            now_ns: now, on the supervisor's timeline.
+            ttl_s: time to live from guard_ns, above 0 and at most 1 s.
+
+        Raises:
+            ConfigError: ttl_s is out of range.
+        """
+        within("lease.ttl_s", ttl_s, 0.0, MAX_TTL_S, above=True)
+        if not self._may_move or not 0 <= now_ns - self._stepped_ns <= SILENT_PERIODS * self.period_ns:
+            return None
+        return Lease(self._epoch, nonce, guard_ns, round(ttl_s * NS_PER_S))
 
     @property
     def level(self) -> ProtectionLevel:

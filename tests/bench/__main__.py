@@ -25,9 +25,9 @@ def main() -> int:
     for column in ("what", "value", "unit", "reference", "ratio", "aim", "holds"):
         table.add_column(column, overflow="fold")
     for r in rows:
-        reference = f"{r.reference:.1f} {r.reference_name}"
+        reference = f"{r.reference:.1f}: {r.reference_name}"
         table.add_row(r.name, f"{r.value:.1f}", r.unit, reference, f"{r.ratio:.2f}", r.aim, "yes" if r.holds else "NO")
-    Console().print(table)
+    Console(width=None if sys.stdout.isatty() else 150).print(table)
     OUT.write_bytes(msgspec.json.format(msgspec.json.encode(rows), indent=2) + b"\n")
     return 0
 

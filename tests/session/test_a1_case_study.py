@@ -67,7 +67,7 @@ def test_the_cascade_follows_the_patch_to_the_other_foot() -> None:
 
 @pytest.mark.parametrize("scenario", ["a1-fall-onto-human-nominal", "a1-fall-onto-human-nominal-standing"])
 def test_nominal_motion_raises_no_intervention(scenario: str) -> None:
-    """Five minutes in all per scenario; `foreshock simulate --duration 600` runs the ten minutes in one go."""
+    """Five minutes each of stepping and of standing, ten in all."""
     found = msgspec.structs.replace(find_scenario(scenario, Registry()), duration_s=75.0)
     for run in run_all([Job(found, "on", seed, detail=False) for seed in SEEDS], workers=2):
         assert isinstance(run, Run)

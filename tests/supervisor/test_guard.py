@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foreshock.errors import ConfigError
 from foreshock.guard import MotionGuard
 from foreshock.records import Lease
 
@@ -116,3 +120,31 @@ def test_many_unanswered_requests_do_not_grow_without_bound_and_the_newest_still
         last = guard.request(k * MS)
     assert guard.receive(answer(*last))
     assert guard.permitted(9_999 * MS)
+
+
+def test_a_lease_that_lives_longer_than_allowed_is_refused() -> None:
+    guard = MotionGuard()
+    nonce, at = guard.request(0)
+    assert not guard.receive(answer(nonce, at, ttl_ns=1_000_000_001))
+    assert not guard.receive(answer(nonce, at, ttl_ns=10**18))
+    assert not guard.permitted(0)
+    assert guard.receive(answer(nonce, at, ttl_ns=1_000_000_000))
+    strict = MotionGuard(max_ttl_ns=50 * MS)
+    assert not strict.receive(answer(*strict.request(0)))
+
+
+@pytest.mark.parametrize("field", ["epoch", "nonce", "guard_ns", "ttl_ns"])
+@pytest.mark.parametrize("value", [float("nan"), None, "1", True])
+def test_a_lease_of_no_type_is_refused_and_does_not_unfence(field: str, value: Any) -> None:
+    guard = MotionGuard()
+    assert guard.receive(answer(*guard.request(0), epoch=2))
+    forged = msgspec.structs.replace(answer(*guard.request(50 * MS), epoch=2), **{field: value})
+    assert not guard.receive(forged)
+    assert not guard.receive(answer(*guard.request(60 * MS), epoch=1))
+    assert not guard.permitted(TTL)
+
+
+@pytest.mark.parametrize("value", [0, -1, 1e9, float("inf"), True])
+def test_a_bound_that_is_none_is_refused(value: Any) -> None:
+    with pytest.raises(ConfigError, match=r"guard\.max_ttl_ns"):
+        MotionGuard(max_ttl_ns=value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,9 +14,11 @@ from foreshock_stage import MS, SLIP, TORSO, detector, fresh, health_of, module,
 
 from foreshock import isolation
 from foreshock.config import Config, DetectorEntry, PolicyEntry
+from foreshock.detector import Inputs
 from foreshock.errors import MissingExtraError, PluginError
-from foreshock.journal import DigestJournal
-from foreshock.records import Decision, ProtectionLevel
+from foreshock.journal import DigestJournal, MemoryJournal
+from foreshock.messages import Scalar
+from foreshock.records import Decision, Indication, ProtectionLevel
 from foreshock.registry import Registry
 from foreshock.supervisor import Supervisor
 
@@ -33,7 +35,7 @@ def supervise(**config: object) -> Supervisor:
 @pytest.fixture(autouse=True)
 def patience(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """However busy this machine is, only a child that hangs counts as hung."""
-    hang_s = 1.5 if "[hang]" in request.node.name else 20.0
+    hang_s = 1.5 if "[hang]" in request.node.name or "a_hang_is" in request.node.name else 20.0
     monkeypatch.setattr(isolation.ChildDetector.__init__, "__defaults__", (hang_s,))
 
 
@@ -107,7 +109,7 @@ def test_an_error_in_the_child_is_named_and_costs_no_child(supervisor: Superviso
     bench = Bench(supervisor)
     first = pid_of(bench.tick(cells.ABSENT))
     bad = bench.tick(cells.RAISE)
-    assert health_of([bad], "cell") == [("failed", "ChildError: ValueError: in the cell")]
+    assert health_of([bad], "cell") == [("failed", "verdict: ValueError: in the cell")]
     assert pid_of(bench.tick(cells.ABSENT)) == first
 
 
@@ -186,3 +188,85 @@ def test_close_is_idempotent_and_leaves_no_process(tmp_path: Path) -> None:
     supervisor.close()
     supervisor.close()
     assert is_gone(pid)
+
+
+class Stub(cells.Cell):
+    """The same measurements as the cell's, in this process; it neither hangs nor raises nor dies."""
+
+    def __init__(self, pids: dict[int, float]) -> None:
+        self._pids = pids
+
+    def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:
+        sample = inputs.latest["value"]
+        calm = msgspec.structs.replace(sample, value=Scalar(min(sample.value.data, cells.PRESENT)))
+        (i,) = super().update(now_ns, Inputs({"value": calm}, inputs.new))
+        return [msgspec.structs.replace(i, measures={**i.measures, "pid": self._pids.get(now_ns, 0.0)})]
+
+
+def replay(journal: MemoryJournal) -> str:
+    """Digest of the run again, with the recorded verdicts and the stub in the child's place."""
+    pids = {d.now_ns: i.measures["pid"] for _, d in journal.ticks for i in d.indications if i.kind == SLIP}
+    spec = msgspec.structs.replace(cells.CELL, build=lambda config: Stub(pids), isolation="in-process")
+    again, other = Supervisor(CELL_ALONE, registry=Registry(modules={"cell": module([spec])})), DigestJournal()
+    for (samples, old), verdicts in zip(journal.ticks, journal.verdicts, strict=True):
+        d = again.step(samples, old.now_ns, verdicts)
+        assert d == old
+        other.tick(samples, d, again.verdicts_of(d))
+    return other.digest
+
+
+CELL_ALONE = Config((DetectorEntry("cell"),), policies=(PolicyEntry("paper-gate"),))
+
+
+def record(
+    values: Sequence[float], at: Callable[[int, Supervisor], object] = lambda k, s: None
+) -> tuple[MemoryJournal, str]:
+    """A run with the real child, by tick; what it recorded and its digest."""
+    live = Supervisor(CELL_ALONE, registry=Registry(modules={"cell": cells}))
+    kept, digests = MemoryJournal(), DigestJournal()
+    try:
+        for k, what in enumerate(values, start=1):
+            at(k, live)
+            samples = [fresh(k * TICK, value=float(what))]
+            d = live.step(samples, k * TICK)
+            for journal in (kept, digests):
+                journal.tick(samples, d, live.verdicts_of(d))
+    finally:
+        live.close()
+    return kept, digests.digest
+
+
+def test_a_hang_is_recorded_as_a_verdict_and_replays_without_the_child() -> None:
+    kept, digest = record([cells.ABSENT, cells.PRESENT, cells.HANG, cells.ABSENT, cells.PRESENT, cells.ABSENT])
+    hung = {"cell": "child process of cell hung for 1.5 s"}
+    assert kept.verdicts == [{}, {}, hung, {}, {}, {}]
+    assert kept.ticks[2][1].trust.unobserved == (SLIP,)
+    assert replay(kept) == digest
+
+
+def test_whatever_befalls_a_child_replays_without_it_until_it_is_given_up() -> None:
+    """Twice the same death in a row, garbage, and three failures that end it: each is told in its tick."""
+    for values in (
+        [0, 1, cells.EXIT, cells.EXIT, 0, 1],
+        [0, cells.RAISE, 1, cells.GARBAGE, 0],
+        [1, cells.RAISE, cells.RAISE, cells.RAISE, 0, 0],
+    ):
+        kept, digest = record(values)
+        failed = [k for k, what in enumerate(values) if what in (cells.EXIT, cells.RAISE, cells.GARBAGE)]
+        assert [k for k, v in enumerate(kept.verdicts) if v] == failed
+        assert replay(kept) == digest
+
+
+def test_a_child_that_cannot_be_restarted_replays_as_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(self: object) -> None:
+        raise isolation.ChildError("cannot be started in a child process: OSError: no more processes")
+
+    kept, digest = record(
+        [0, 1, cells.EXIT, 1, 0],
+        lambda k, s: monkeypatch.setattr(isolation.ChildDetector, "_start", broken) if k == 3 else None,
+    )
+    assert [bool(v) for v in kept.verdicts] == [False, False, True, False, False]
+    assert kept.verdicts[2]["cell"].startswith("gave up: reset raised cannot be started")
+    assert "exit code 7" in kept.verdicts[2]["cell"]
+    assert all(d.trust.unobserved == (SLIP,) for _, d in kept.ticks[2:])
+    assert replay(kept) == digest

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from foreshock_stage import MS, SLIP, detector, fresh, play, said, stage
 
-from foreshock.journal import DigestJournal, MemoryJournal
+from foreshock.journal import DigestJournal, MemoryJournal, OperatorReset
 from foreshock.records import Decision, Health, Indication, Intervention, ProtectionLevel, SampleRef
 
 SPEC = detector("d", [SLIP], lambda now: [said(SLIP, True, now)])
@@ -71,6 +71,12 @@ def test_the_memory_journal_keeps_what_came_in_and_what_was_decided() -> None:
     journal.tick(samples, d)
     samples.clear()
     assert journal.ticks == [((fresh(10 * MS),), d)]
+    assert journal.verdicts == [{}]
+    reset = OperatorReset(10 * MS, "operator 7", "looked at the robot")
+    journal.operator_reset(reset)
+    journal.tick((), d, {"d": "late"})
+    assert journal.verdicts == [{}, {"d": "late"}]
+    assert journal.resets == [(1, reset)]
 
 
 def test_records_are_frozen_and_compare_by_value() -> None:
@@ -83,3 +89,37 @@ def test_records_are_frozen_and_compare_by_value() -> None:
 def test_a_decision_survives_the_wire_exactly() -> None:
     d = decision()
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(d), type=Decision) == d
+
+
+def test_verdicts_and_resets_count_with_their_place_and_content() -> None:
+    d = decision()
+    resets = [
+        OperatorReset(1, "a", "b"),
+        OperatorReset(2, "a", "b"),
+        OperatorReset(1, "b", "b"),
+        OperatorReset(1, "a", ""),
+    ]
+
+    def of(*entries: object) -> str:
+        journal = DigestJournal()
+        for entry in entries:
+            if isinstance(entry, OperatorReset):
+                journal.operator_reset(entry)
+            else:
+                journal.tick((), d, entry)  # type: ignore[arg-type]  # verdicts
+        return journal.digest
+
+    late, hung = {"d": "late"}, {"d": "hung"}
+    histories = [
+        ({}, {}),
+        (late, {}),
+        ({}, late),
+        (hung, {}),
+        ({"e": "late"}, {}),
+        (resets[0], {}, {}),
+        ({}, resets[0], {}),
+    ]
+    histories += [({}, r, {}) for r in resets[1:]]
+    assert len({of(*h) for h in histories}) == len(histories)
+    assert of({}, {}) == digest(d, d)  # a run without verdicts and resets is its decisions
+    assert of({"a": "x", "b": "y"}) == of({"b": "y", "a": "x"})

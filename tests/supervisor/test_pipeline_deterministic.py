@@ -294,3 +294,43 @@ def test_inputs_hold_what_is_new_since_the_last_update() -> None:
     stamps = [[s.stamp_ns // TICK for s in i.new["value"]] for i in scripted.inputs]
     assert stamps == [[1], [2, 3], [4, 5]]
     assert [i.latest["value"].stamp_ns // TICK for i in scripted.inputs] == [1, 3, 5]
+
+
+def test_a_recorded_run_with_verdicts_and_resets_replays_to_the_same_digest() -> None:
+    """What a MemoryJournal holds is all that decides; without the resets or the verdicts it is another run."""
+    live, kept, digests = built(ORDER, ORDER), MemoryJournal(), DigestJournal()
+    for k, arrived in enumerate(stream(5, 150), start=1):
+        lost = [] if 40 <= k < 90 else arrived
+        late = {"slip": "late: 12 ms of 5 ms"} if k in (7, 8) else None  # the same words twice in a row
+        d = live.step(lost, k * TICK, late)
+        for journal in (kept, digests):
+            journal.tick(lost, d, live.verdicts_of(d))
+            if k in (80, 110):
+                journal.operator_reset(live.operator_reset("operator 7", "looked", k * TICK))
+    assert kept.verdicts[6:8] == [{"slip": "late: 12 ms of 5 ms"}] * 2
+
+    def replayed(verdicts: bool = True, resets: bool = True) -> str:
+        again, journal = built(ORDER, ORDER), DigestJournal()
+        for k, ((samples, old), said_of) in enumerate(zip(kept.ticks, kept.verdicts, strict=True), start=1):
+            d = again.step(samples, old.now_ns, said_of if verdicts else None)
+            journal.tick(samples, d, again.verdicts_of(d))
+            for at, record in kept.resets:
+                if at == k and resets:
+                    journal.operator_reset(again.operator_reset(record.who, record.why, record.stamp_ns))
+        return journal.digest
+
+    assert replayed() == digests.digest
+    assert len({replayed(), replayed(verdicts=False), replayed(resets=False)}) == 3
+
+
+def test_a_policy_s_or_channel_s_failure_and_what_a_detector_raises_are_no_verdicts() -> None:
+    for answer in (ValueError("verdict: late"), ValueError("; the last: verdict: late")):
+        supervisor = stage(detector("d", [SLIP], lambda now, a=answer: a))
+        assert [supervisor.verdicts_of(d) for d in play(supervisor, 4, TICK)] == [{}] * 4
+
+
+def test_the_verdict_that_ends_a_detector_is_a_verdict_once() -> None:
+    supervisor = stage(detector("d", [SLIP], lambda now: [said(SLIP, False, now)]))
+    ticks = [supervisor.step([fresh(k * TICK)], k * TICK, {"d": "late"}) for k in range(1, 7)]
+    told = [supervisor.verdicts_of(d) for d in ticks]
+    assert told == [{"d": "late"}] * 3 + [{}] * 3

@@ -9,16 +9,35 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from foreshock_stage import COM, MS, SLIP, TORSO, detector, fresh, health_of, play, said, stage
+from foreshock_stage import (
+    COM,
+    MS,
+    SLIP,
+    TORSO,
+    Nothing,
+    Scripted,
+    ScriptedPolicy,
+    detector,
+    fresh,
+    health_of,
+    module,
+    play,
+    said,
+    stage,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foreshock.detector import DetectorSpec
-from foreshock.errors import BadInputError
+from foreshock.detector import DetectorSpec, Input
+from foreshock.errors import BadInputError, ConfigError, ForeshockError
 from foreshock.evidence import Window
+from foreshock.guard import MotionGuard
 from foreshock.journal import DigestJournal
-from foreshock.messages import Heartbeat, Scalar
+from foreshock.messages import Detections, Heartbeat, Message, Scalar
+from foreshock.policy import PolicySpec
 from foreshock.records import Decision, Indication, ProtectionLevel, Sample
+from foreshock.registry import Registry
+from foreshock.supervisor import Supervisor
 from foreshock.trust import TrustSettings
 
 TICK = 20 * MS
@@ -45,6 +64,7 @@ ROGUES: dict[str, tuple[Callable[[int], Any], str]] = {
     "raises outside Exception": (lambda now: Panic("native panic"), "Panic: native panic"),
     "exits": (lambda now: SystemExit(3), "SystemExit"),
     "raises without words": (lambda now: MuteError(), "MuteError"),
+    "raises what cannot be written": (lambda now: ValueError("half a letter \ud800"), "half a letter"),
     "recurses": (lambda now: RecursionError("deep"), "RecursionError"),
     "exhausts memory": (lambda now: MemoryError(), "MemoryError"),
     "None": (lambda now: None, "NoneType"),
@@ -104,7 +124,7 @@ def test_a_rogue_makes_its_kinds_unobserved_and_is_named(name: str) -> None:
     overdue = [d.now_ns - 6 * TICK > 300 * MS for d in after]
     assert [d.level is ProtectionLevel.MINIMAL_RISK for d in after] == overdue
     assert [d.motion_permitted for d in after] == [not o for o in overdue]
-    assert supervisor.lease(1, 0) is None
+    assert supervisor.lease(1, 0, after[-1].now_ns) is None
 
 
 def test_the_operator_s_interrupt_is_not_contained() -> None:
@@ -399,12 +419,12 @@ def test_no_lease_and_no_intervention_during_warm_up() -> None:
     for k in range(1, 10):
         d = supervisor.step([fresh(k * TICK)], k * TICK)
         assert not d.motion_permitted
-        assert supervisor.lease(1, 0) is None
+        assert supervisor.lease(1, 0, k * TICK) is None
         assert d.interventions == ()
         assert d.trust.unobserved == (SLIP,)
     d = supervisor.step([fresh(10 * TICK)], 10 * TICK)
     assert d.motion_permitted
-    lease = supervisor.lease(7, 123, 0.1)
+    lease = supervisor.lease(7, 123, 10 * TICK, 0.1)
     assert lease is not None
     assert (lease.nonce, lease.guard_ns, lease.ttl_ns) == (7, 123, 100 * MS)
 
@@ -422,7 +442,7 @@ def test_a_verdict_makes_the_detector_unobserved_in_its_tick() -> None:
     supervisor = stage(detector("d", [SLIP], lambda now: [slip(now)]))
     d = supervisor.step([fresh(TICK)], TICK, {"d": "late: 12 ms of 5 ms"})
     assert d.trust.unobserved == (SLIP,)
-    assert health_of([d], "d") == [("failed", "late: 12 ms of 5 ms")]
+    assert health_of([d], "d") == [("failed", "verdict: late: 12 ms of 5 ms")]
 
 
 def test_a_verdict_on_a_detector_that_does_not_run_is_refused() -> None:
@@ -461,3 +481,172 @@ def test_observed_absence_withdraws_a_prediction() -> None:
 def test_a_spec_whose_times_are_no_times_is_refused(field: str, value: float) -> None:
     with pytest.raises(BadInputError, match=field):
         stage(detector("d", [SLIP], lambda now: [slip(now)], **{field: value}))
+
+
+@pytest.mark.parametrize("verdict", [None, 3, ["late"]])
+def test_a_verdict_of_no_type_is_refused(verdict: Any) -> None:
+    with pytest.raises(BadInputError, match=r"verdicts\.d"):
+        stage(detector("d", [SLIP], lambda now: [slip(now)])).step([], TICK, {"d": verdict})
+
+
+def test_a_verdict_without_words_is_a_verdict() -> None:
+    supervisor = stage(detector("d", [SLIP], lambda now: [slip(now)]))
+    assert supervisor.step([fresh(TICK)], TICK, {"d": ""}).trust.unobserved == (SLIP,)
+
+
+# ---- failures count together within a minute
+
+
+def failing_at(*seconds: int) -> list[Decision]:
+    """Ticks of 1 s over five minutes; the detector raises at these."""
+    s = 1_000_000_000
+    script = lambda now: ValueError("x") if now // s in seconds else [slip(now)]  # noqa: E731 # a script
+    return play(stage(detector("d", [SLIP], script)), 300, s)
+
+
+def test_failures_far_apart_do_not_end_a_detector() -> None:
+    """At any time at most two lie within a minute, up to the tick."""
+    decisions = failing_at(10, 60, 70, 120, 130, 180, 240)
+    assert [k for k, d in enumerate(decisions, start=1) if d.trust.unobserved] == [10, 60, 70, 120, 130, 180, 240]
+
+
+def test_three_failures_within_a_minute_end_it_until_reset() -> None:
+    decisions = failing_at(10, 40, 69)
+    assert [k for k, d in enumerate(decisions, start=1) if d.trust.unobserved] == [10, 40, *range(69, 301)]
+    assert "gave up after 3 failures" in health_of(decisions, "d")[-1][1]
+
+
+# ---- readers of everything
+
+
+class Broken(Message, frozen=True):
+    """A message that is none of ours."""
+
+
+MALFORMED: dict[str, tuple[Any, str, str]] = {
+    "stamp str": (Sample("a", "talos/odd", Scalar(0.0)), "talos/odd", "stamp"),  # type: ignore[arg-type]
+    "stamp NaN": (Sample(math.nan, "talos/odd", Scalar(0.0)), "talos/odd", "stamp"),  # type: ignore[arg-type]
+    "stamp beyond 64 bits": (Sample(-(10**30), "talos/odd", Scalar(0.0)), "talos/odd", "stamp"),
+    "seq str": (Sample(1, "talos/odd", Scalar(0.0), "a"), "talos/odd", "seq"),  # type: ignore[arg-type]
+    "seq inf": (Sample(1, "talos/odd", Scalar(0.0), math.inf), "talos/odd", "seq"),  # type: ignore[arg-type]
+    "received None": (Sample(1, "talos/odd", Scalar(0.0), 1, None), "talos/odd", "received"),  # type: ignore[arg-type]
+    "NaN": (Sample(1, "talos/odd", Scalar(math.nan)), "talos/odd", "not finite"),
+    "int beyond float": (Sample(1, "talos/odd", Scalar(10**400)), "talos/odd", "not finite"),
+    "broken inside": (Sample(1, "talos/odd", Detections((None,))), "talos/odd", "Detections"),  # type: ignore[arg-type]
+    "no message": (Sample(1, "talos/odd", None), "talos/odd", "NoneType"),  # type: ignore[arg-type]
+    "foreign message": (Sample(1, "talos/odd", Broken()), "talos/odd", "Broken"),  # type: ignore[arg-type]
+    "channel None": (Sample(1, None, Scalar(0.0)), "samples", "NoneType"),  # type: ignore[arg-type]
+    "channel list": (Sample(1, ["x"], Scalar(0.0)), "samples", "list"),  # type: ignore[arg-type]
+    "channel half a letter": (Sample(1, "talos/\ud800", Scalar(0.0)), "samples", "printed"),
+    "channel named as the detector": (Sample(1, "all", Scalar(math.nan)), "samples", "not finite"),
+    "no sample": (None, "samples", "NoneType"),
+}
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+@pytest.mark.parametrize("everything", [True, False])
+def test_a_malformed_sample_on_an_unknown_channel_is_dropped_and_named(name: str, everything: bool) -> None:
+    sample, source, named = MALFORMED[name]
+    reader = Scripted(lambda now: [slip(now)])
+    spec = detector("all", [SLIP], reader)
+    if everything:
+        spec = msgspec.structs.replace(spec, inputs=(Input("value", "*", Scalar),))
+    supervisor = stage(spec)
+    decisions = play(supervisor, 6, TICK, samples=lambda k, now: [*([sample] if k in (2, 3, 4) else []), fresh(now)])
+    journal = DigestJournal()
+    for d in decisions:
+        journal.tick((), d)
+    assert all(d.trust.unobserved == () for d in decisions)
+    assert [s.stamp_ns for i in reader.inputs for s in i.new["value"]] == [k * TICK for k in range(1, 7)]
+    (state, reason), back = health_of(decisions, source)
+    assert (state, back[0]) == ("failed", "ok")
+    assert named in reason
+    assert [h.source for h in decisions[1].health] == [source]
+
+
+@pytest.mark.parametrize("fields", [{"seq": "a"}, {"received_ns": math.nan}, {"stamp_ns": 10**400}])
+def test_a_misnumbered_sample_on_a_known_channel_makes_its_readers_kinds_unobserved(fields: dict[str, Any]) -> None:
+    supervisor = stage(detector("d", [SLIP], lambda now: [slip(now)]))
+    d = supervisor.step([msgspec.structs.replace(fresh(TICK), **fields)], TICK)
+    assert d.trust.unobserved == (SLIP,)
+    assert next(iter(fields)).removesuffix("_ns") in health_of([d], "d")[0][1]
+    DigestJournal().tick((), d)
+
+
+# ---- the lease
+
+
+PERIOD = 5 * MS
+"""Of the default configuration."""
+
+
+def moving() -> Supervisor:
+    """After ten good ticks."""
+    supervisor = stage(detector("d", [SLIP], lambda now: [slip(now)]))
+    assert supervisor.period_ns == PERIOD
+    assert play(supervisor, 10, PERIOD)[-1].motion_permitted
+    return supervisor
+
+
+@pytest.mark.parametrize(("after_ns", "granted"), [(0, True), (2 * PERIOD, True), (2 * PERIOD + 1, False), (-1, False)])
+def test_a_supervisor_that_stopped_stepping_grants_nothing(after_ns: int, granted: bool) -> None:
+    assert (moving().lease(1, 0, 10 * PERIOD + after_ns) is not None) is granted
+
+
+def test_a_step_that_raised_takes_the_permission_back() -> None:
+    supervisor = moving()
+    with pytest.raises(ForeshockError, match="backwards"):
+        supervisor.step([], PERIOD)
+    assert supervisor.lease(1, 0, 10 * PERIOD) is None
+    supervisor = moving()
+    with pytest.raises(BadInputError, match="verdicts"):
+        supervisor.step([], 11 * PERIOD, {"nobody": "late"})
+    assert supervisor.lease(1, 0, 11 * PERIOD) is None
+    supervisor.step([fresh(12 * PERIOD)], 12 * PERIOD)
+    assert supervisor.lease(1, 0, 12 * PERIOD) is not None
+
+
+def test_reset_takes_the_permission_back() -> None:
+    supervisor = moving()
+    supervisor.reset(0, 10 * PERIOD)
+    assert supervisor.lease(1, 0, 10 * PERIOD) is None
+
+
+@pytest.mark.parametrize("ttl_s", [0.0, -1.0, math.nan, math.inf, 1.0000001, 1e9])
+def test_a_time_to_live_that_is_none_or_too_long_is_refused(ttl_s: float) -> None:
+    supervisor = moving()
+    with pytest.raises(ConfigError, match=r"lease\.ttl_s"):
+        supervisor.lease(1, 0, 10 * PERIOD, ttl_s)
+    lease = supervisor.lease(1, 0, 10 * PERIOD, 1.0)
+    assert lease is not None
+    assert lease.ttl_ns == 1000 * MS
+
+
+def test_a_supervisor_of_a_later_epoch_fences_off_the_earlier() -> None:
+    spec = detector("d", [SLIP], lambda now: [slip(now)])
+    base = stage(spec)
+    quiet = module(policies=[PolicySpec("stage", lambda _: ScriptedPolicy(lambda _: ()), Nothing)])
+    registry = Registry(modules={"d": module([spec]), "stage": quiet})
+    old = Supervisor(base.config, registry=registry, epoch=1_700_000_000_000_000_000)
+    new = Supervisor(base.config, registry=registry, epoch=1_700_000_060_000_000_000)
+    guard = MotionGuard()
+
+    def asks(supervisor: Supervisor, k: int) -> bool:
+        now = k * PERIOD
+        supervisor.step([fresh(now)], now)
+        lease = supervisor.lease(*guard.request(now), now)
+        assert lease is not None
+        return guard.receive(lease)
+
+    assert asks(old, 1)
+    assert asks(new, 2)
+    assert not asks(old, 3)  # replaced, but still running and content
+    assert guard.permitted(2 * PERIOD + 100 * MS - 1)
+    assert not guard.permitted(2 * PERIOD + 100 * MS)
+    assert asks(new, 4)
+
+
+@pytest.mark.parametrize("epoch", [-1, 1.5, math.nan, True, "1"])
+def test_an_epoch_that_is_none_is_refused(epoch: Any) -> None:
+    with pytest.raises(ConfigError, match="epoch"):
+        Supervisor(stage(detector("d", [SLIP], lambda now: [slip(now)])).config, epoch=epoch)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from tests.rogues.plugins.entry_points import GALLERY, install
 
 from foreshock.config import parse_config
 from foreshock.errors import BadInputError, ConfigError, PluginError
+from foreshock.hookspecs import hookimpl
 from foreshock.registry import Registry
 from foreshock.supervisor import Supervisor
 from foreshock.taxonomy import builtin_taxonomy
@@ -110,3 +112,22 @@ def test_two_plugins_with_one_id_are_refused(tmp_path: Path, monkeypatch: pytest
     registry.load("other-id")
     with pytest.raises(PluginError, match="id 'knee-torque' is taken by plugin"):
         registry.detectors()
+
+
+def _offers(*files: object) -> ModuleType:
+    module = ModuleType("offers")
+    module.foreshock_scenarios = hookimpl(lambda: files)  # type: ignore[attr-defined]  # a module made by hand
+    return module
+
+
+def test_scenario_files_name_their_plugin() -> None:
+    """A bad hook is strict for scenarios(), and hides no other plugin's files from scenario_files()."""
+    b, a = Path("/nowhere/b.toml"), Path("/nowhere/a.toml")
+    registry = Registry({"second": _offers(a), "first": _offers(b, a), "third": _offers(a, "c.toml")})
+    for name in ("first", "second", "third"):
+        registry.load(name)
+    files, broken = registry.scenario_files()
+    assert files == (("first", a), ("first", b), ("second", a))
+    assert [(x.name, "gave a str, Path is expected" in x.reason) for x in broken] == [("third", True)]
+    with pytest.raises(PluginError, match="plugin third"):
+        registry.scenarios()

@@ -10,6 +10,8 @@ import pytest
 from foreshock import messages
 from foreshock.errors import BadInputError, ConfigError
 from foreshock.messages import Detections, GripState, Heartbeat, Imu, Odometry, Scalar
+from foreshock.policy import ACTIONS
+from foreshock.taxonomy import builtin_taxonomy
 from foreshock_twins.fmi._channels import MESSAGES
 from foreshock_twins.fmi._message_units import MESSAGE_UNITS
 
@@ -91,6 +93,16 @@ MISTAKES = [
     ("yaw = 3.0", 'yaw = "position"', "channels[3].humans[0].yaw", "is in 'm'; a human's yaw is in 'rad'"),
     ("yaw = 3.0", "jaw = 3.0", "channels[3].humans[0].jaw", "did you mean 'yaw'"),
     ('action = "push"', 'action = "pull"', "interventions[1].action", "given twice"),
+    (
+        'action = "push"',
+        'action = "balance-lok"',
+        "interventions[0].action",
+        "'balance-lok' is not a known action; did you mean 'balance-lock'?",
+    ),
+    ('action = "push"', 'action = "Balance_Lock"', "interventions[0].action", "did you mean 'balance-lock'?"),
+    ('action = "push"', 'action = "minimal-risks"', "interventions[0].action", "did you mean 'minimal-risk'?"),
+    ('action = "push"', 'action = "push it"', "interventions[0].action", "expected one in kebab-case"),
+    ('action = "push"', 'action = ""', "interventions[0].action", "expected one in kebab-case"),
     ("force = 100.0", "forse = 100.0", "interventions[0].inputs.forse", "did you mean 'force'"),
     (
         "force = 100.0",
@@ -102,6 +114,8 @@ MISTAKES = [
     ("{ force = 100.0 }", "{}", "interventions[0].inputs", "is empty"),
     ('value = "moving_left"', 'value = "moving_loft"', "events[0].value", "did you mean 'moving_left'"),
     ('value = "moving_left"', 'value = "force"', "events[0].value", "is an input"),
+    ('mode = "A1"', 'mode = "A77"', "events[0].mode", "'A77' is not the code of an accident mode; did you mean 'A7'"),
+    ('mode = "A1"', 'mode = "a1"', "events[0].mode", "'a1' is not the code of an accident mode"),
     ("below = 0.0", "beneath = 0.0", "events[0].when[0].above", "give one of above and below"),
     ("below = 0.0", "below = 0.0, above = 1.0", "events[0].when[0].above", "give one of above and below"),
     ("limit = 0.5\n", "", "events[0].limit", "is missing"),
@@ -119,6 +133,20 @@ def test_a_wrong_binding_is_refused_with_its_place(make_twin, tmp_path, old, new
         make_twin(plant=str(OSCILLATOR), binding=str(path))
     assert caught.value.place in (f"{path}: {place}",)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("action", [*sorted(ACTIONS), "wave-arms", "sit"])
+def test_known_actions_and_those_of_a_policy_plugin_are_bound(make_twin, tmp_path, action):
+    path = tmp_path / "binding.toml"
+    path.write_text(BINDING.replace('action = "push"', f'action = "{action}"'))
+    assert make_twin(plant=str(OSCILLATOR), binding=str(path)).actions == {action, "pull"}
+
+
+@pytest.mark.parametrize("mode", ["", *builtin_taxonomy().codes])
+def test_an_event_has_a_mode_of_the_taxonomy_or_none(make_twin, tmp_path, mode):
+    path = tmp_path / "binding.toml"
+    path.write_text(BINDING.replace('mode = "A1"', f'mode = "{mode}"'))
+    make_twin(plant=str(OSCILLATOR), binding=str(path))
 
 
 @pytest.mark.parametrize(

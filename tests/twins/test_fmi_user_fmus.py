@@ -18,6 +18,7 @@ from foreshock.records import Intervention
 HERE = Path(__file__).parent / "mixed"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 MS = 1_000_000
+LIBRARY_FOLDER = {2: "linux64", 3: f"{platform.machine()}-linux"}  # as the standard of each names it
 BINDING = """
 [binding]
 step_s = 0.01
@@ -55,7 +56,7 @@ def build_mixed(tmp_path_factory):
     """Compiles the hand-written FMU of tests/twins/mixed; gives a function of version and changes to its XML."""
     work = tmp_path_factory.mktemp("mixed")
 
-    def build(version, *changes, binary=True):
+    def build(version, *changes, binary=True, content=None):
         library = work / f"fmi{version}.so"
         if not library.exists():
             flags = ["-shared", "-fPIC", "-O1", "-Wall", "-Werror", f"-I{HEADERS}"]
@@ -64,17 +65,28 @@ def build_mixed(tmp_path_factory):
         for old, new in changes:
             assert old in xml
             xml = xml.replace(old, new)
-        fmu = work / f"mixed{version}-{abs(hash((changes, binary)))}.fmu"
-        where = "linux64" if version == 2 else f"{platform.machine()}-linux"
+        fmu = work / f"mixed{version}-{abs(hash((changes, binary, content)))}.fmu"
+        where = LIBRARY_FOLDER[version]
         with zipfile.ZipFile(fmu, "w") as archive:
             archive.writestr("modelDescription.xml", xml)
-            if binary:
+            if content is not None:
+                archive.writestr(f"binaries/{where}/mixed.so", content)
+            elif binary:
                 archive.write(library, f"binaries/{where}/mixed.so")
             else:
                 archive.writestr("binaries/win64/mixed.dll", b"")
         return str(fmu)
 
     return build
+
+
+@pytest.fixture(scope="session")
+def bare_library(tmp_path_factory):
+    """A shared library that loads, with no function of FMI in it."""
+    folder = tmp_path_factory.mktemp("bare")
+    (folder / "bare.c").write_text("int nothing(void) { return 0; }\n")
+    subprocess.run(["cc", "-shared", "-fPIC", str(folder / "bare.c"), "-o", str(folder / "bare.so")], check=True)
+    return (folder / "bare.so").read_bytes()
 
 
 @pytest.fixture
@@ -155,9 +167,30 @@ def test_a_fixed_internal_step_is_respected(build_mixed, make_twin, binding):
 @pytest.mark.parametrize("version", [2, 3])
 def test_an_fmu_for_other_platforms_says_which(build_mixed, make_twin, binding, version):
     before = Path.cwd()
-    with pytest.raises(ConfigError, match="it holds binaries for win64"):
-        make_twin(fmu=build_mixed(version, binary=False), binding=binding)
+    fmu = build_mixed(version, binary=False)
+    with pytest.raises(ConfigError, match="it holds binaries for win64") as caught:
+        make_twin(fmu=fmu, binding=binding)
     assert Path.cwd() == before
+    assert caught.value.place == fmu
+    assert f" binaries/{LIBRARY_FOLDER[version]}/mixed.so" in caught.value.problem  # not where it was extracted
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x7fELF, or so it says", "no functions"], ids=["empty", "cut", "no-functions"]
+)
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_broken_library_is_named_as_the_user_knows_it(
+    build_mixed, make_twin, tmp_path, binding, version, content, bare_library
+):
+    """The file that the user gave and the library's path inside it; the scratch folder means nothing to the user."""
+    fmu = build_mixed(version, content=bare_library if content == "no functions" else content)
+    before = Path.cwd()
+    with pytest.raises(ConfigError) as caught:
+        make_twin(fmu=fmu, binding=binding)
+    assert Path.cwd() == before
+    assert caught.value.place == fmu
+    assert f" binaries/{LIBRARY_FOLDER[version]}/mixed.so" in caught.value.problem
+    assert str(tmp_path) not in caught.value.problem
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -182,8 +215,10 @@ def test_a_zip_without_description_is_no_fmu(make_twin, tmp_path, binding):
     fmu = tmp_path / "empty.fmu"
     with zipfile.ZipFile(fmu, "w") as archive:
         archive.writestr("readme.txt", textwrap.dedent("nothing"))
-    with pytest.raises(ConfigError, match="cannot be read"):
+    with pytest.raises(ConfigError, match="cannot be read") as caught:
         make_twin(fmu=str(fmu), binding=binding)
+    assert caught.value.place == str(fmu)
+    assert str(tmp_path) not in caught.value.problem
 
 
 @pytest.mark.parametrize("version", [2, 3])

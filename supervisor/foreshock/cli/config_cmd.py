@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 import msgspec
+from rich.markup import escape
 
 from foreshock.cli.output import console, emit, notes
 from foreshock.config import config_schema, load_config
@@ -39,6 +40,6 @@ def schema() -> None:
     """Print the JSON schema of a configuration, with the settings of all installed plugins."""
     registry = Registry()
     for broken in registry.load_all():
-        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {broken.reason}")
+        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {escape(broken.reason)}")
     generated = config_schema(registry.detectors(), registry.policies())
     click.echo(msgspec.json.format(msgspec.json.encode(generated, order="sorted"), indent=2).decode())

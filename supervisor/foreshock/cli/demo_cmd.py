@@ -73,7 +73,7 @@ def cells(seeds: int, per_cell: int) -> list[Cell]:
 @click.option(
     "--seeds", type=click.IntRange(1), default=50, show_default=True, help="Runs per arm at default parameters."
 )
-@click.option("--per-cell", type=click.IntRange(1), default=20, show_default=True, help="Runs per arm and severity.")
+@click.option("--per-cell", type=click.IntRange(1), default=10, show_default=True, help="Runs per arm and severity.")
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def demo(out: Path, seed: int, seeds: int, per_cell: int, workers: int, as_json: bool) -> int:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import click
 import msgspec
+from rich.markup import escape
 
 from foreshock.cli.output import console, emit, notes, table
 from foreshock.registry import Registry
-from foreshock.session.scenario import find_scenario, scenario_ids
+from foreshock.session.scenario import broken_scenarios, find_scenario, scenario_ids
 
 __all__ = ["scenarios"]
 
@@ -23,8 +24,8 @@ def list_(as_json: bool) -> None:
     """List the scenarios of the installed plugins."""
     registry = Registry()
     known = scenario_ids(registry)
-    for broken in registry.load_all():
-        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {broken.reason}")
+    for broken in (*registry.load_all(), *broken_scenarios(registry)):
+        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {escape(broken.reason)}")
     if as_json:
         emit([{"id": s.id, "mode": s.mode, "expect": s.expect, "title": s.title} for s in known.values()])
         return

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from rich.markup import escape
 
 from foreshock.cli.output import console, emit, notes, table
 from foreshock.registry import Registry
@@ -25,7 +26,7 @@ def show(as_json: bool, extend: Path | None) -> None:
     """Show classes, modes, cascades and kinds, those of installed plugins included."""
     registry = Registry()
     for broken in registry.load_all():
-        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {broken.reason}")
+        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {escape(broken.reason)}")
     full = builtin_taxonomy().extended(registry.precursors())
     if extend is not None:
         full = full.extended_from(extend)

@@ -113,6 +113,8 @@ def _actions(a: Axes, run: Run, names: Sequence[str]) -> None:
         a.fill_between(t, k - 0.4 * s, k + 0.4 * s, color=TRUST, alpha=0.75, lw=0)
     a.set_yticks(range(len(names)), [n.replace("-", " ") for n in names], fontsize=8)
     a.set_ylim(-0.7, max(len(names), 1) - 0.3)
+    if run.supervisor == "shadow" and run.interventions:
+        a.set_title("decided, not applied", fontsize=8, color=GREY, loc="right", pad=2)
     if not run.interventions:
         a.text(0.5, 0.5, "no intervention", transform=a.transAxes, ha="center", va="center", color=GREY)
 

@@ -74,7 +74,7 @@ def simulate(
         if judge is not None:
             decision = judge.step(samples, now)
             for recorder in recorders:
-                recorder.tick(samples, decision)
+                recorder.tick(samples, decision, judge.verdicts_of(decision))
             if arm == "on":
                 for change in decision.changes:
                     if change.action in twin.actions:

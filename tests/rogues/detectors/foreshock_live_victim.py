@@ -40,7 +40,7 @@ def main(watchdog_s: float) -> None:
             if request == "hang":
                 what = cells.HANG
                 continue
-            lease = supervisor.lease(*request, ttl_s=1.0)
+            lease = supervisor.lease(*request, now_ns=monotonic_ns() - began, ttl_s=1.0)
             answer = None if lease is None else [lease.epoch, lease.nonce, lease.guard_ns, lease.ttl_ns]
             print(json.dumps(answer), flush=True)  # the protocol
 

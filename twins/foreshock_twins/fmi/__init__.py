@@ -44,5 +44,5 @@ def build_twin(config: FmiTwinConfig, robot: str, scratch: Path) -> Twin:
 
 @hookimpl
 def foreshock_twins() -> Sequence[TwinSpec]:
-    """The twin kind ``fmi``."""
+    """The twin kind ``fmu``."""
     return [TwinSpec(id="fmu", build=build_twin, config=FmiTwinConfig, summary="A co-simulation FMU, FMI 2.0 or 3.0")]
