@@ -47,8 +47,7 @@ def write_project(name: str, kind: str | None, folder: Path, taken: Iterable[str
         ConfigError: the name does not fit or is taken, or the folder holds something.
     """
     package = f"foreshock_{name.replace('-', '_')}"
-    folder = folder.resolve()
-    _refuse(name, package, kind, folder, set(taken))
+    _refuse(name, package, kind, folder.resolve(), set(taken))
     own = kind is None
     id_ = name if kind is None else kind
     words = {
