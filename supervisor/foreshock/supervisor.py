@@ -17,7 +17,7 @@ from foreshock.isolation import ChildDetector
 from foreshock.journal import OperatorReset
 from foreshock.pipeline import Pipeline, State
 from foreshock.policy import ACTIONS, Arbiter
-from foreshock.records import Decision, Lease, ProtectionLevel, Sample
+from foreshock.records import Decision, Lease, Sample
 from foreshock.registry import Registry
 from foreshock.risk import IndependentRisk
 from foreshock.taxonomy import Taxonomy, builtin_taxonomy
@@ -162,11 +162,6 @@ class Supervisor:
         if not self._may_move or not 0 <= now_ns - self._stepped_ns <= SILENT_PERIODS * self.period_ns:
             return None
         return Lease(self._epoch, nonce, guard_ns, round(ttl_s * NS_PER_S))
-
-    @property
-    def level(self) -> ProtectionLevel:
-        """Protection level overall after the last tick."""
-        return self._state.overall.level
 
     def close(self) -> None:
         """End child processes; idempotent."""

@@ -55,7 +55,7 @@ def protective_separation(
         human_speed_m_s: measured v_h; its whole magnitude, for a person turns within T_r. None if it is not measured:
             1.6 m/s beyond 0.5 m of separation, 2.0 m/s nearer.
         human_age_s: age of the position used for the human, after extrapolation.
-        robot_speed_m_s: v_r, of the robot's closest part towards the human; negative counts as 0.
+        robot_speed_m_s: v_r, of the robot's fastest part towards the human; negative counts as 0.
         robot_age_s: age of the robot's state.
         uncertainty_m: Z_d as the tracker states it.
         fall_clearance_m: separation between the human and all that a falling robot can reach (negative inside);
