@@ -33,9 +33,9 @@ def list_(as_json: bool) -> None:
         return
     rows = [
         (
-            f"[bold]{d.id}[/]\n{escape(d.distribution)}\n{d.isolation}\n{_packages(d.extra)}",
+            f"{d.id}\n{d.distribution}\n{d.isolation}\n{_packages(d.extra)}",
             "\n".join(d.kinds),
-            "\n".join(escape(f"{i.channel} {i.type}" + ("" if i.required else "?")) for i in d.inputs),
+            "\n".join(f"{i.channel} {i.type}" + ("" if i.required else "?") for i in d.inputs),
         )
         for d in found
     ]
@@ -46,8 +46,8 @@ def list_(as_json: bool) -> None:
 
 def _packages(extra: Extra) -> str:
     if extra.installed:
-        return "[green]packages installed[/]"
-    return f"[yellow]lacks {escape(', '.join(extra.missing))}[/]\nrun: {escape(extra.command)}"
+        return "packages installed"
+    return f"lacks {', '.join(extra.missing)}\nrun: {extra.command}"
 
 
 @detectors.command()

@@ -12,7 +12,7 @@ from rich.markup import escape
 from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
-from foreshock.cli.output import BAD_INPUT, FAILED, OK, emit, notes
+from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, emit, notes
 from foreshock.cli.scenarios_cmd import scenarios
 from foreshock.cli.simulate_cmd import simulate
 from foreshock.cli.taxonomy_cmd import taxonomy
@@ -40,7 +40,8 @@ def cli() -> None:
 
     Precursors in, accident probability and trust, graded interventions out.
 
-    Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a twin that failed.
+    Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a twin that failed;
+    130 interrupted.
     """
 
 
@@ -59,7 +60,7 @@ def main(args: list[str] | None = None) -> None:
     except click.exceptions.Exit as e:
         code = e.exit_code
     except click.Abort:
-        code, kind, message = FAILED, "interrupted", "interrupted"
+        code, kind, message = INTERRUPTED, "interrupted", "interrupted"
     except click.ClickException as e:
         code, kind, message = BAD_INPUT, "usage", e.format_message()
     except BadInputError as e:

@@ -1,6 +1,7 @@
 """How commands print: tables for people, one JSON envelope for programs, one line for an error.
 
-Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a twin that failed.
+Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a twin that failed;
+130 interrupted.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-__all__ = ["BAD_INPUT", "FAILED", "NEGATIVE", "OK", "console", "emit", "notes", "table"]
+__all__ = ["BAD_INPUT", "FAILED", "INTERRUPTED", "NEGATIVE", "OK", "console", "emit", "notes", "table"]
 
-OK, NEGATIVE, BAD_INPUT, FAILED = 0, 1, 2, 3
+OK, NEGATIVE, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 SCHEMA = "foreshock/1"
 
 console = Console(highlight=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else 120)

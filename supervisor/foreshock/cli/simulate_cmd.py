@@ -132,7 +132,8 @@ def summary(run: Run) -> str:
     )
     outcome = f"[{colour}]outcome: {escape(run.outcome)}[/]"
     lines = [f"{outcome}{escape(': ' + what if what else ', nothing happened')}; seed {run.seed}"]
-    lost = [h for h in run.health if h.state not in ("ok", "warm-up")]
+    # streams that have not begun in the first 0.1 s are no loss
+    lost = [h for h in run.health if h.state not in ("ok", "warm-up") and h.stamp_ns > 100_000_000]
     lines += [f"[yellow]{escape(f'{h.source} {h.state} at {h.stamp_ns / 1e9:.3f} s: {h.reason}')}[/]" for h in lost[:8]]
     if len(lost) > 8:
         lines.append(f"[yellow]and {len(lost) - 8} more changes of health; see --json[/]")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import statistics
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -44,6 +45,7 @@ def write_report(
     """
     source = files("foreshock").joinpath("data/report.html.j2").read_text()
     page = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    page.filters["median"] = statistics.median
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(
         page.from_string(source).render(
