@@ -97,8 +97,8 @@ def test_reset_equals_new_even_after_failures_and_latches() -> None:
     used = built(ORDER, ORDER)
     digest(used, stream(1))
     for k in range(200, 400):
-        used.step([], k * TICK)
-    assert used.level is ProtectionLevel.MINIMAL_RISK
+        last = used.step([], k * TICK)
+    assert last.level is ProtectionLevel.MINIMAL_RISK
     used.operator_reset("a", "b", 400 * TICK)
     used.reset(7)
     new = built(ORDER, ORDER)
