@@ -13,7 +13,7 @@ from foreshock.detector import DetectorSpec, Isolation
 from foreshock.errors import ConfigError
 from foreshock.evidence import Window
 from foreshock.policy import PolicySpec
-from foreshock.risk import LogisticExponential
+from foreshock.risk import RiskSettings
 from foreshock.trust import Gates, TrustSettings
 
 __all__ = [
@@ -78,7 +78,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     detectors: tuple[DetectorEntry, ...]
     supervisor: SupervisorSettings = SupervisorSettings()
     window: Window = Window()
-    risk: LogisticExponential = LogisticExponential()
+    risk: RiskSettings = RiskSettings()
     trust: TrustSettings = TrustSettings()
     gates: Gates = Gates()
     policies: tuple[PolicyEntry, ...] = (PolicyEntry("ladder"),)

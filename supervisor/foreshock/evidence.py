@@ -49,7 +49,7 @@ SHORTEST_S = 0.001
 """A shorter window or recurrence period (1 kHz) would count ticks instead of conditions."""
 
 
-class Track(msgspec.Struct, frozen=True):
+class Track(msgspec.Struct, frozen=True, gc=False):
     """What one detector saw of one (kind, subject). Times are on the track's own clock, which stops when frozen.
 
     Attributes:
@@ -76,7 +76,7 @@ class Track(msgspec.Struct, frozen=True):
 
 
 class Evidence(msgspec.Struct, frozen=True):
-    """All tracks that still count."""
+    """All tracks that still count, sorted by key."""
 
     tracks: Mapping[Key, Track] = {}
 
@@ -130,25 +130,31 @@ def step(
             tracks[key] = _present(old, seen, local, recur)
         else:
             tracks[key] = msgspec.structs.replace(old, present=False, seen=seen)
-    for key, old in before.items():
-        if key in tracks:
-            continue
-        if key[2] not in lost and carried is not None and key in carried:
-            local = now_ns - old.stopped_ns
-            tracks[key] = _present(old, old.seen, local, recur) if old.present and old.frozen_ns < 0 else old
-        elif old.frozen_ns < 0:
-            tracks[key] = msgspec.structs.replace(old, frozen_ns=now_ns)
-        else:
-            tracks[key] = old
+    if not before.keys() <= tracks.keys():
+        for key, old in before.items():
+            if key in tracks:
+                continue
+            if key[2] not in lost and carried is not None and key in carried:
+                local = now_ns - old.stopped_ns
+                tracks[key] = _present(old, old.seen, local, recur) if old.present and old.frozen_ns < 0 else old
+            elif old.frozen_ns < 0:
+                tracks[key] = msgspec.structs.replace(old, frozen_ns=now_ns)
+            else:
+                tracks[key] = old
     if not tracks:
         return NOTHING, ()
-    kept = {key: t for key, track in tracks.items() if (t := _expire(track, now_ns, span)) is not None}
+    # sorted by key: most ticks have the keys of the last, which are
+    order: Iterable[Key] = before if tracks.keys() == before.keys() else sorted(tracks)
+    kept = {key: t for key in order if (t := _expire(tracks[key], now_ns, span)) is not None}
     return Evidence(kept), _merge(kept, window, now_ns, fresh)
 
 
 def _thaw(track: Track, now_ns: int) -> Track:
     stopped = track.stopped_ns + now_ns - track.frozen_ns
     return msgspec.structs.replace(track, stopped_ns=stopped, frozen_ns=-1)
+
+
+NO_PEAK = (-(1 << 62), 0, 0.0)
 
 
 def _present(old: Track, seen: Indication, local_ns: int, recur_ns: int) -> Track:
@@ -163,14 +169,15 @@ def _present(old: Track, seen: Indication, local_ns: int, recur_ns: int) -> Trac
         while newest + recur_ns <= local_ns:
             newest += recur_ns
             occurrences = (*occurrences, newest)
-    kept, severity = old.peaks, seen.severity
-    if kept and local_ns - kept[-1][0] < BUCKET_NS:
-        first, _, peak = kept[-1]
-        peaks = (*kept[:-1], (first, local_ns, max(peak, severity)))
+    peaks, severity = old.peaks, seen.severity
+    first, _, peak = peaks[-1] if peaks else NO_PEAK
+    if local_ns - first < BUCKET_NS:
+        last = (first, local_ns, severity if severity > peak else peak)
+        peaks = (last,) if len(peaks) == 1 else (*peaks[:-1], last)
     else:
-        while kept and kept[-1][2] <= severity:
-            kept = kept[:-1]
-        peaks = (*kept, (local_ns, local_ns, severity))
+        while peaks and peaks[-1][2] <= severity:
+            peaks = peaks[:-1]
+        peaks = (*peaks, (local_ns, local_ns, severity))
     return Track(True, onset, stretches, occurrences, local_ns, peaks, old.stopped_ns, -1, seen)
 
 
@@ -181,36 +188,41 @@ def _expire(track: Track, now_ns: int, span_ns: int) -> Track | None:
     if not track.present and track.last_ns <= horizon:
         return None
     occurrences, peaks, stretches = track.occurrences_ns, track.peaks, track.stretches
-    if occurrences and occurrences[0] <= horizon:
-        occurrences = tuple(t for t in occurrences if t > horizon)
-    if peaks and peaks[0][1] <= horizon:
-        peaks = tuple(p for p in peaks if p[1] > horizon)
-    if len(stretches) > 1 and stretches[0][1] <= horizon:
-        stretches = tuple(s for s in stretches[:-1] if s[1] > horizon) + stretches[-1:]
-    if occurrences is track.occurrences_ns and peaks is track.peaks and stretches is track.stretches:
+    if (
+        (not occurrences or occurrences[0] > horizon)
+        and (not peaks or peaks[0][1] > horizon)
+        and (len(stretches) == 1 or stretches[0][1] > horizon)
+    ):
         return track
+    occurrences = tuple(t for t in occurrences if t > horizon)
+    peaks = tuple(p for p in peaks if p[1] > horizon)
+    stretches = tuple(s for s in stretches[:-1] if s[1] > horizon) + stretches[-1:]
     return msgspec.structs.replace(track, occurrences_ns=occurrences, peaks=peaks, stretches=stretches)
 
 
 def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[Key]) -> tuple[Precursor, ...]:
-    """One precursor per (kind, subject): several detectors of one kind count once, by their maximum."""
+    """One precursor per (kind, subject): several detectors of one kind count once, by their maximum.
+
+    Args:
+        tracks: sorted by key.
+        window: its kernel.
+        now_ns: time of the tick.
+        fresh: keys whose onset is in this tick.
+    """
     found: dict[tuple[str, str], Precursor] = {}
-    for key in sorted(tracks):
+    boxcar, tau = window.kernel == "boxcar", window.length_s * 1e9
+    for key, track in tracks.items():
         kind, subject, detector = key
-        track = tracks[key]
-        frozen = track.frozen_ns >= 0
-        local = (track.frozen_ns if frozen else now_ns) - track.stopped_ns
-        if window.kernel == "boxcar":
-            weight, q = 1.0, float(max(1, len(track.occurrences_ns)))
+        frozen, seen, peaks, stretches = track.frozen_ns >= 0, track.seen, track.peaks, track.stretches
+        if boxcar:
+            weight, q = 1.0, float(len(track.occurrences_ns) or 1)
         else:
-            tau = window.length_s * 1e9
+            local = (track.frozen_ns if frozen else now_ns) - track.stopped_ns
             weight = 1.0 if track.present else math.exp((track.last_ns - local) / tau)
-            q = max(weight, math.fsum(math.exp((t - local) / tau) for t in track.occurrences_ns))
+            q = max(weight, math.fsum([math.exp((t - local) / tau) for t in track.occurrences_ns]))
         phase: Phase = "onset" if key in fresh else "ongoing" if track.present else "cleared"
-        seen = track.seen
-        peaks, stretches = track.peaks, track.stretches
         peak = peaks[0][2] if len(peaks) == 1 else max([p[2] for p in peaks], default=seen.severity)
-        onset = stretches[0][0] if len(stretches) == 1 else min([source for source, _ in stretches])
+        onsets = (stretches[0][0],) if len(stretches) == 1 else tuple(sorted([source for source, _ in stretches]))
         mine = Precursor(
             kind,
             subject,
@@ -218,16 +230,19 @@ def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[
             peak,
             q,
             weight,
-            onset,
+            onsets[0],
             detector,
             frozen,
             seen.statistic,
             seen.threshold,
             seen.unit,
             seen.evidence,
+            onsets,
         )
-        pair = key[:2]
-        found[pair] = _stronger(found[pair], mine) if pair in found else mine
+        pair = (kind, subject)
+        if pair in found:
+            mine = _stronger(found[pair], mine)
+        found[pair] = mine
     return tuple(found.values())
 
 
@@ -245,5 +260,6 @@ def _stronger(a: Precursor, b: Precursor) -> Precursor:
         weight=max(a.weight, b.weight),
         occurrences=max(a.occurrences, b.occurrences),
         onset_ns=min(a.onset_ns, b.onset_ns),
+        onsets_ns=tuple(sorted({*a.onsets_ns, *b.onsets_ns})),
         frozen=a.frozen and b.frozen,
     )

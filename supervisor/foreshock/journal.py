@@ -21,11 +21,15 @@ NO_VERDICTS: Mapping[str, str] = MappingProxyType({})
 
 
 class OperatorReset(msgspec.Struct, frozen=True):
-    """An operator's release of latched protection levels: when, who and why."""
+    """An operator's release of latched protection levels: when, who, why, and of which dimension of trust.
+
+    dimension is ``overall``, the code of an accident mode, the id of a precursor class, or ``""`` for all.
+    """
 
     stamp_ns: int
     who: str
     why: str
+    dimension: str = ""
 
 
 class Journal(Protocol):

@@ -17,9 +17,10 @@ from foreshock.containment import Contained, proposals_of
 from foreshock.detector import Input
 from foreshock.errors import BadInputError, nearest
 from foreshock.policy import Arbiter, ArbiterState, Policy, Proposal, Situation
-from foreshock.records import Decision, Intervention, ProtectionLevel, Sample
-from foreshock.risk import IndependentRisk
-from foreshock.trust import Gates, LevelState, TrustModel, TrustState, level_step, levels_step
+from foreshock.records import Decision, Explanation, Intervention, Precursor, ProtectionLevel, Sample
+from foreshock.risk import RiskModel
+from foreshock.taxonomy import Taxonomy
+from foreshock.trust import Gates, LevelState, TrustModel, TrustState, edge_step, levels_step
 
 __all__ = ["Pipeline", "State"]
 
@@ -38,6 +39,7 @@ class State(msgspec.Struct, frozen=True):
         trust: control-level trust.
         overall: protection level from overall trust and lost evidence.
         levels: protection level per accident mode.
+        class_levels: protection level per precursor class.
         arbiter: what the arbiter has seen.
         health: state and reason of detectors and channels.
     """
@@ -52,8 +54,12 @@ class State(msgspec.Struct, frozen=True):
     trust: TrustState = TrustState()
     overall: LevelState = LevelState()
     levels: Mapping[str, LevelState] = {}
+    class_levels: Mapping[str, LevelState] = {}
     arbiter: ArbiterState = ArbiterState()
     health: cov.HealthMap = {}
+
+
+PROTECTIVE = ProtectionLevel.PROTECTIVE
 
 
 class Pipeline:
@@ -67,23 +73,30 @@ class Pipeline:
         gates: trust to protection levels.
         policies: levels to proposals.
         arbiter: proposals to interventions.
-        modes: codes of all accident modes.
+        taxonomy: whose modes and classes are the dimensions of trust.
+
+    Raises:
+        ConfigError: the gates name a dimension that does not exist.
     """
 
     def __init__(
         self,
         detectors: Sequence[Contained],
         window: ev.Window,
-        risk: IndependentRisk,
+        risk: RiskModel,
         trust: TrustModel,
         gates: Gates,
         policies: Sequence[Policy],
         arbiter: Arbiter,
-        modes: Sequence[str],
+        taxonomy: Taxonomy,
     ) -> None:
         self.detectors = tuple(detectors)
-        self._window, self._risk, self._trust, self._gates = window, risk, trust, gates
-        self._policies, self._arbiter, self._modes = tuple(policies), arbiter, tuple(modes)
+        self._window, self._risk, self._trust = window, risk, trust
+        self._gates, self._mode_gates = gates.of_overall(), gates.of_modes(taxonomy)
+        self._edges = self._gates.edges()
+        self._mode_edges = {mode: g.edges() for mode, g in self._mode_gates.items()}
+        self._class_edges = {class_: g.edges() for class_, g in gates.of_classes(taxonomy).items()}
+        self._policies, self._arbiter = tuple(policies), arbiter
         self.warm_up_ns = max((round(d.spec.warm_up_s * 1e9) for d in detectors), default=0)
         self._ids = [d.spec.id for d in self.detectors]
         self._everything: list[list[Sample]] = []
@@ -161,12 +174,14 @@ class Pipeline:
         trust_state, trust, overdue = self._trust.step(state.trust, risk, sorted(unobserved), now_ns)
         if warm:
             trust_state, overdue = msgspec.structs.replace(trust_state, unobserved_ns={}), False
-        overall = level_step(state.overall, self._gates, trust.control_trust, overdue, now_ns)
-        levels = levels_step(state.levels, self._gates, trust.control_by_mode, now_ns)
+        overall = edge_step(state.overall, self._edges, trust.control_trust, overdue, now_ns)
+        levels = levels_step(state.levels, self._mode_edges, trust.control_by_mode, now_ns)
+        class_levels = levels_step(state.class_levels, self._class_edges, trust.control_by_class, now_ns)
         predicted = cov.standing_predictions(state.predicted, heard, tracks, now_ns)
         times = self._times(predicted, now_ns)
         soonest = min(times.values(), default=None)
         by_mode = {mode: s.level for mode, s in levels.items()}
+        by_class = {class_: s.level for class_, s in class_levels.items()}
         arbiter = state.arbiter
         held: tuple[Intervention, ...] = ()
         changes: tuple[Intervention, ...] = ()
@@ -174,12 +189,21 @@ class Pipeline:
             # read-only: a policy is a plugin, and must not write into what the next tick starts from
             seen_levels, seen_trust = MappingProxyType(by_mode), MappingProxyType(trust.control_by_mode)
             situation = Situation(
-                now_ns, seen_levels, seen_trust, trust.control_trust, overall.level, precursors, soonest, times
+                now_ns,
+                seen_levels,
+                seen_trust,
+                trust.control_trust,
+                overall.level,
+                precursors,
+                soonest,
+                times,
+                MappingProxyType(by_class),
+                MappingProxyType(trust.control_by_class),
             )
             proposals, fault = proposals_of(self._policies, situation, self._arbiter.actions)
             if fault:
                 health["policy"] = ("failed", fault)
-                overall = level_step(overall, self._gates, trust.control_trust, True, now_ns)
+                overall = edge_step(overall, self._edges, trust.control_trust, True, now_ns)
             if overall.level is ProtectionLevel.MINIMAL_RISK:
                 why = fault or "latched until an operator resets it"
                 if overdue:
@@ -212,6 +236,8 @@ class Pipeline:
             not warm and not missing and level < ProtectionLevel.MINIMAL_RISK,
             soonest,
             tuple(heard.observed.values()),
+            by_class,
+            self._explanations(state, overall, levels, precursors),
         )
         after = State(
             state.tick + 1,
@@ -224,10 +250,26 @@ class Pipeline:
             trust_state,
             overall,
             levels,
+            class_levels,
             arbiter,
             health,
         )
         return after, decision
+
+    def _explanations(
+        self, before: State, overall: LevelState, levels: Mapping[str, LevelState], precursors: Sequence[Precursor]
+    ) -> tuple[Explanation, ...]:
+        """Why the overall level, or that of a mode, rose in this tick."""
+        rises = [("", self._gates, before.overall, overall)] if overall is not before.overall else []
+        if levels is not before.levels:
+            rises += [(m, self._mode_gates[m], before.levels.get(m, LevelState()), s) for m, s in levels.items()]
+        return tuple(
+            [
+                self._risk.explain(precursors, gates.protective if now.level >= PROTECTIVE else gates.caution, mode)
+                for mode, gates, old, now in rises
+                if now.level > old.level
+            ]
+        )
 
     def _times(self, predicted: Mapping[ev.Key, tuple[int, float]], now_ns: int) -> dict[str, float]:
         """Shortest predicted time (s) from now per accident mode that one is predicted for."""

@@ -80,6 +80,8 @@ class Situation(msgspec.Struct, frozen=True):
         precursors: evidence inside the window.
         time_to_event_s: shortest predicted time to any accident, None if none is predicted.
         times: shortest predicted time per accident mode that one is predicted for; None where modes are not told apart.
+        class_levels: protection level per precursor class.
+        class_trust: control-level trust per precursor class.
     """
 
     now_ns: int
@@ -90,13 +92,15 @@ class Situation(msgspec.Struct, frozen=True):
     precursors: Sequence[Precursor]
     time_to_event_s: float | None
     times: Mapping[str, float] | None = None
+    class_levels: Mapping[str, ProtectionLevel] = {}
+    class_trust: Mapping[str, float] = {}
 
     def time_to(self, mode: str) -> float | None:
         """Predicted time to an accident of this mode; ``""`` means of any."""
         return self.time_to_event_s if self.times is None or not mode else self.times.get(mode)
 
 
-class Proposal(msgspec.Struct, frozen=True):
+class Proposal(msgspec.Struct, frozen=True, gc=False):
     """An action that a policy wants: strength 0..1, for which mode, at which level, by which rule."""
 
     action: str
@@ -126,12 +130,16 @@ class PolicySpec(msgspec.Struct, frozen=True):
 class ArbiterState(msgspec.Struct, frozen=True):
     """What the arbiter has seen: actions that hold, since when each was engaged, and how far each is released.
 
-    releasing maps an action to the tick that released it and its strength then.
+    releasing maps an action to the tick that released it and its strength then; held are the active ones, by action.
+    settled is what was asked for in the last tick, if the same asked again changes nothing: None while a release ramps,
+    a time to the accident is predicted or a mitigation holds, all of which depend on the time.
     """
 
     active: Mapping[str, Intervention] = {}
     engaged_ns: Mapping[str, int] = {}
     releasing: Mapping[str, tuple[int, float]] = {}
+    held: tuple[Intervention, ...] = ()
+    settled: tuple[frozenset[Proposal], frozenset[str]] | None = None
 
 
 UNCONDITIONAL = frozenset({"speed-scale", "minimal-risk"})
@@ -225,6 +233,10 @@ class Arbiter:
             return state, (), ()
         now = situation.now_ns
         present = frozenset([p.kind for p in situation.precursors if p.phase != "cleared"])
+        timed = situation.time_to_event_s is not None or bool(situation.times)
+        asked = frozenset(proposals)
+        if not timed and state.settled == (asked, present):
+            return state, state.held, ()
         wanted = [p for p in proposals if p.strength > 0.0]
         feasible = [
             p
@@ -264,7 +276,9 @@ class Arbiter:
             active[action] = held
             engaged[action] = state.engaged_ns.get(action, now)
         held_now = tuple(active[a] for a in sorted(active))
-        return ArbiterState(active, engaged, releasing), held_now, tuple(sorted(changes, key=lambda i: i.action))
+        timed = timed or bool(releasing) or any(self.actions[a].mitigates for a in active)
+        after = ArbiterState(active, engaged, releasing, held_now, None if timed else (asked, present))
+        return after, held_now, tuple(sorted(changes, key=lambda i: i.action))
 
     def _moved(self, old: float, new: float) -> bool:
         return new > old or old - new >= self._step or (new != old and new == 0.0)

@@ -1,6 +1,7 @@
 """What flows: Sample -> Indication -> Precursor -> RiskEstimate -> Trust -> Intervention, bundled in a Decision.
 
-All records are frozen; times are integer nanoseconds on the source's timeline.
+All records are frozen; times are integer nanoseconds on the source's timeline. Those that are made many times a tick are
+not tracked by the garbage collector: frozen trees of values cannot be part of a cycle.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ __all__ = [
     "Attribution",
     "ChannelState",
     "Decision",
+    "Explanation",
     "Health",
     "Indication",
     "Intervention",
@@ -42,7 +44,7 @@ class ProtectionLevel(IntEnum):
     MINIMAL_RISK = 3
 
 
-class Sample(msgspec.Struct, frozen=True):
+class Sample(msgspec.Struct, frozen=True, gc=False):
     """One message on one channel.
 
     Attributes:
@@ -60,14 +62,14 @@ class Sample(msgspec.Struct, frozen=True):
     received_ns: int = -1
 
 
-class SampleRef(msgspec.Struct, frozen=True):
+class SampleRef(msgspec.Struct, frozen=True, gc=False):
     """Points to a sample as evidence."""
 
     channel: str
     stamp_ns: int
 
 
-class Indication(msgspec.Struct, frozen=True):
+class Indication(msgspec.Struct, frozen=True, gc=False):
     """What a detector says of one of its kinds and one subject, every period. Absence is said, not implied.
 
     Attributes:
@@ -97,7 +99,7 @@ class Indication(msgspec.Struct, frozen=True):
     measures: dict[str, float] = {}
 
 
-class Precursor(msgspec.Struct, frozen=True):
+class Precursor(msgspec.Struct, frozen=True, gc=False):
     """Evidence of one kind about one subject inside the window.
 
     Attributes:
@@ -108,6 +110,7 @@ class Precursor(msgspec.Struct, frozen=True):
         occurrences: its share of q.
         weight: its share of m: 1 for the boxcar window, less with an exponential kernel.
         onset_ns: source stamp of the first onset that still counts.
+        onsets_ns: source stamps of all onsets that still count, sorted; empty means onset_ns alone.
         detector: who saw it (the strongest, if several).
         frozen: nobody observes it now, so that its clock stands still.
         statistic: last judged number.
@@ -129,6 +132,7 @@ class Precursor(msgspec.Struct, frozen=True):
     threshold: float = 0.0
     unit: str = "1"
     evidence: tuple[SampleRef, ...] = ()
+    onsets_ns: tuple[int, ...] = ()
 
 
 class Attribution(msgspec.Struct, frozen=True):
@@ -139,19 +143,38 @@ class Attribution(msgspec.Struct, frozen=True):
     share: float
 
 
+class Explanation(msgspec.Struct, frozen=True):
+    """Why P is what it is, overall or for one accident mode.
+
+    Attributes:
+        mode: code of the accident mode; ``""`` for overall.
+        probability: P that actions are taken on.
+        attribution: by how much that P falls if one precursor is left out, the largest first.
+        gate: of trust, that the smallest set is about.
+        smallest: the fewest precursors that alone keep T = 1 - P below the gate; empty if all of them do not.
+    """
+
+    mode: str
+    probability: float
+    attribution: tuple[Attribution, ...]
+    gate: float
+    smallest: tuple[tuple[str, str], ...]
+
+
 class RiskEstimate(msgspec.Struct, frozen=True):
     """Accident probability, with its bounds and the counts behind it.
 
     Attributes:
         probability: P of Eq. 1, 0..1, on all precursors.
         lower: lower bound of P over what the model does not know.
-        upper: upper bound; trust is built on it.
-        m: number of distinct (kind, subject) pairs.
-        q: number of their occurrences.
+        upper: upper bound; trust is built on it by default.
+        m: number of distinct (kind, subject) pairs; the effective number where they correlate.
+        q: number of their occurrences; likewise.
         by_mode: P per accident mode, on the kinds that belong to the mode.
         by_class: P per precursor class.
         counts: (m, q) per accident mode.
-        attribution: leave-one-out share of each precursor.
+        upper_by_mode: upper bound per accident mode.
+        upper_by_class: upper bound per precursor class.
     """
 
     probability: float
@@ -162,7 +185,8 @@ class RiskEstimate(msgspec.Struct, frozen=True):
     by_mode: dict[str, float] = {}
     by_class: dict[str, float] = {}
     counts: dict[str, tuple[float, float]] = {}
-    attribution: tuple[Attribution, ...] = ()
+    upper_by_mode: dict[str, float] = {}
+    upper_by_class: dict[str, float] = {}
 
 
 class Trust(msgspec.Struct, frozen=True):
@@ -176,6 +200,8 @@ class Trust(msgspec.Struct, frozen=True):
         by_class: T per precursor class.
         coverage: share of the configured kinds that are observed now, 0..1.
         unobserved: the configured kinds that are not.
+        control_by_class: control-level trust per precursor class.
+        coverage_by_mode: coverage per accident mode; 0 where no configured detector watches it.
     """
 
     trust: float
@@ -185,9 +211,11 @@ class Trust(msgspec.Struct, frozen=True):
     by_class: dict[str, float] = {}
     coverage: float = 1.0
     unobserved: tuple[str, ...] = ()
+    control_by_class: dict[str, float] = {}
+    coverage_by_mode: dict[str, float] = {}
 
 
-class Intervention(msgspec.Struct, frozen=True):
+class Intervention(msgspec.Struct, frozen=True, gc=False):
     """An action asked of the robot. It persists until it is replaced or released (strength 0).
 
     Attributes:
@@ -244,6 +272,8 @@ class Decision(msgspec.Struct, frozen=True):
         motion_permitted: whether a lease may be granted.
         time_to_event_s: the shortest predicted time to an accident, if one is predicted.
         indications: what the detectors said in this tick.
+        class_levels: protection level per precursor class.
+        explanations: why, in a tick in which the level of a mode or the overall level rose.
     """
 
     now_ns: int
@@ -259,3 +289,5 @@ class Decision(msgspec.Struct, frozen=True):
     motion_permitted: bool
     time_to_event_s: float | None = None
     indications: tuple[Indication, ...] = ()
+    class_levels: dict[str, ProtectionLevel] = {}
+    explanations: tuple[Explanation, ...] = ()

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import importlib.metadata as md
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import msgspec
 import pluggy
@@ -24,14 +25,6 @@ from foreshock.taxonomy import PrecursorKind
 from foreshock.twin import TwinSpec
 
 __all__ = ["Broken", "Registry"]
-
-
-class _Named(Protocol):
-    @property
-    def id(self) -> str: ...
-
-
-T = TypeVar("T", bound=_Named)
 
 
 class Broken(msgspec.Struct, frozen=True):
@@ -96,18 +89,18 @@ class Registry:
 
     def detector(self, id_: str, place: str) -> DetectorSpec:
         """The detector with this id, loading the plugin of that name."""
-        self.load(id_, place)
-        return _pick(self.detectors(), id_, place, "detector")
+        spec: DetectorSpec = self._named(id_, place, "foreshock_detectors", DetectorSpec, "detector")
+        return spec
 
     def policy(self, id_: str, place: str) -> PolicySpec:
         """The policy with this id, loading the plugin of that name."""
-        self.load(id_, place)
-        return _pick(self.policies(), id_, place, "policy")
+        spec: PolicySpec = self._named(id_, place, "foreshock_policies", PolicySpec, "policy")
+        return spec
 
     def twin(self, id_: str, place: str) -> TwinSpec:
         """The kind of twin with this id, loading the plugin of that name."""
-        self.load(id_, place)
-        return _pick(self.twins(), id_, place, "kind of twin")
+        spec: TwinSpec = self._named(id_, place, "foreshock_twins", TwinSpec, "kind of twin")
+        return spec
 
     def detectors(self) -> tuple[DetectorSpec, ...]:
         """Detectors of the loaded plugins, by id."""
@@ -149,6 +142,32 @@ class Registry:
             for item in _given(impl, hook, of):
                 yield impl.plugin_name, item
 
+    def _named(self, id_: str, place: str, hook: str, of: type, what: str) -> Any:
+        """What has this id, from the plugin of that name: the only one that is loaded, unless there is no such thing.
+
+        Raises:
+            ConfigError: nobody offers it; the hint names others of its sort, not whatever is installed.
+            PluginError: as load().
+        """
+        problem = f"no plugin {id_!r} is installed"
+        if id_ in self.names:
+            self.load(id_, place)
+            found = {item.id: item for item in self._sorted(hook, of)}
+            if id_ in found:
+                return found[id_]
+            problem = f"plugin {id_!r} offers no {what} {id_!r}"
+        raise ConfigError(place, problem, nearest(id_, self._offered(hook, of)))
+
+    def _offered(self, hook: str, of: type) -> set[str]:
+        """Ids of all that the installed plugins offer; loads them apart, and passes over those that are broken."""
+        everything = Registry(self._extra)
+        everything.load_all()
+        ids: set[str] = set()
+        for impl in getattr(everything._manager.hook, hook).get_hookimpls():
+            with suppress(PluginError):
+                ids |= {item.id for item in _given(impl, hook, of)}
+        return ids
+
     def _sorted(self, hook: str, of: type) -> tuple[Any, ...]:
         found: dict[str, tuple[str, Any]] = {}
         for plugin, item in self._call(hook, of):
@@ -181,10 +200,3 @@ def _given(impl: Any, hook: str, of: type) -> tuple[Any, ...]:
             problem = f"{hook} gave a {type(item).__name__}, {of.__name__} is expected"
             raise PluginError(f"plugin {impl.plugin_name}", problem)
     return given
-
-
-def _pick(specs: Iterable[T], id_: str, place: str, what: str) -> T:
-    found = {s.id: s for s in specs}
-    if id_ not in found:
-        raise ConfigError(place, f"plugin {id_!r} offers no {what} {id_!r}", nearest(id_, found))
-    return found[id_]

@@ -19,7 +19,6 @@ from foreshock.pipeline import Pipeline, State
 from foreshock.policy import ACTIONS, Arbiter
 from foreshock.records import Decision, Lease, Sample
 from foreshock.registry import Registry
-from foreshock.risk import IndependentRisk
 from foreshock.taxonomy import Taxonomy, builtin_taxonomy
 from foreshock.trust import LevelState, TrustModel
 from foreshock.verdicts import verdict_in
@@ -70,7 +69,7 @@ class Supervisor:
         self._pipeline = Pipeline(
             contained,
             config.window,
-            IndependentRisk(config.risk, taxonomy),
+            config.risk.build(base or Path(), taxonomy, config.window.length_s),
             TrustModel(config.trust, taxonomy, {k for c in contained for k in c.kinds}),
             config.gates,
             [
@@ -78,7 +77,7 @@ class Supervisor:
                 for k, (p, entry) in enumerate(zip(policies, config.policies, strict=True))
             ],
             Arbiter(actions, config.supervisor.release_s),
-            taxonomy.codes,
+            taxonomy,
         )
         self.period_ns = round(config.supervisor.period_s * NS_PER_S)
         self.resets: list[OperatorReset] = []
@@ -133,14 +132,36 @@ class Supervisor:
         found = {h.source: verdict_in(h.reason) for h in decision.health if h.source in ids and h.state == "failed"}
         return {name: verdict for name, verdict in found.items() if verdict is not None}
 
-    def operator_reset(self, who: str, why: str, now_ns: int) -> OperatorReset:
+    def operator_reset(self, who: str, why: str, now_ns: int, dimension: str = "") -> OperatorReset:
         """Release latched levels; what still demands protection demands it again in the next tick.
 
         The record decides as samples do: whoever keeps a journal gives it to Journal.operator_reset.
+
+        Args:
+            who: the operator.
+            why: what was checked.
+            now_ns: now, on the supervisor's timeline.
+            dimension: of trust, that is released: ``overall``, an accident mode's code, a class's id; ``""`` for all.
+
+        Raises:
+            BadInputError: who or why is empty, or there is no such dimension.
         """
-        record = OperatorReset(now_ns, who, why)
+        for name, value in (("who", who), ("why", why)):
+            if not value.strip():
+                raise BadInputError(f"operator_reset.{name}", "empty; a reset is recorded with who and why")
+        state, fresh = self._state, LevelState()
+        codes, classes = self.taxonomy.codes, [c.id for c in self.taxonomy.classes]
+        if dimension not in ("", "overall", *codes, *classes):
+            hint = nearest(dimension, ["overall", *codes, *classes])
+            raise BadInputError("operator_reset.dimension", f"no dimension of trust {dimension!r}", hint)
+        record = OperatorReset(now_ns, who, why, dimension)
         self.resets.append(record)
-        self._state = msgspec.structs.replace(self._state, overall=LevelState(), levels={})
+        self._state = msgspec.structs.replace(
+            state,
+            overall=fresh if dimension in ("", "overall") else state.overall,
+            levels={m: s for m, s in state.levels.items() if dimension not in ("", m)},
+            class_levels={c: s for c, s in state.class_levels.items() if dimension not in ("", c)},
+        )
         return record
 
     def lease(self, nonce: int, guard_ns: int, now_ns: int, ttl_s: float = 0.1) -> Lease | None:

@@ -7,7 +7,8 @@ constant, and is capped while something is not observed. Gates are written ``not
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple
 
 import msgspec
 
@@ -16,7 +17,18 @@ from foreshock.errors import ConfigError, nearest
 from foreshock.records import ProtectionLevel, RiskEstimate, Trust
 from foreshock.taxonomy import Taxonomy
 
-__all__ = ["Gates", "LevelState", "TrustModel", "TrustSettings", "TrustState", "level_step", "levels_step"]
+__all__ = [
+    "Edges",
+    "GateChange",
+    "Gates",
+    "LevelState",
+    "TrustModel",
+    "TrustSettings",
+    "TrustState",
+    "edge_step",
+    "level_step",
+    "levels_step",
+]
 
 
 class TrustSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -24,8 +36,10 @@ class TrustSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         recovery_s: time constant of recovery; it falls at once.
-        unobserved_cap: control_trust is at most this for modes (and overall) of which a kind is not observed.
+        unobserved_cap: control_trust is at most this for modes, classes and overall, where a kind is not observed.
         grace_s: a kind that stays unobserved longer brings the minimal risk condition.
+        acts_on: what trust is the complement of: the ``upper`` bound of P, or the model's own ``probability``, which a
+            wrong model may put too low.
 
     Raises:
         ConfigError: a number that would switch the cap or the grace time off, such as NaN.
@@ -34,6 +48,7 @@ class TrustSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     recovery_s: float = 0.5
     unobserved_cap: float = 0.8
     grace_s: float = 0.3
+    acts_on: Literal["upper", "probability"] = "upper"
 
     def __post_init__(self) -> None:
         within("trust.recovery_s", self.recovery_s, 0.0, above=True)
@@ -41,8 +56,29 @@ class TrustSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         within("trust.grace_s", self.grace_s, 0.0)
 
 
+class Edges(NamedTuple):
+    """What a level is judged by: gates, those of a level that holds, the level that latches, and the dwell."""
+
+    caution: float
+    caution_held: float
+    protective: float
+    protective_held: float
+    latch: int
+    dwell_ns: int
+
+
+class GateChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the gates of one dimension of trust differ from the common ones; what is not given is as there."""
+
+    caution: float | None = None
+    protective: float | None = None
+    hysteresis: float | None = None
+    dwell_s: float | None = None
+    latch: str | None = None
+
+
 class Gates(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """At which control-level trust a protection level begins and ends.
+    """At which control-level trust a protection level begins and ends, for every dimension of trust.
 
     Attributes:
         caution: below it, cheap and reversible actions.
@@ -50,6 +86,9 @@ class Gates(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         hysteresis: a level is given up only this far above its gate.
         dwell_s: a level holds this long after the last tick that demanded it.
         latch: levels from this one on hold until an operator resets them; ``none`` for no latch.
+        overall: what differs for overall trust.
+        modes: what differs for an accident mode, by code.
+        classes: what differs for a precursor class, by id.
 
     Raises:
         ConfigError: gates that are not in order or not within 0..1, or a negative hysteresis or dwell.
@@ -60,6 +99,9 @@ class Gates(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hysteresis: float = 0.1
     dwell_s: float = 1.0
     latch: str = "minimal-risk"
+    overall: GateChange = GateChange()
+    modes: dict[str, GateChange] = {}
+    classes: dict[str, GateChange] = {}
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.protective <= self.caution <= 1.0):
@@ -69,6 +111,60 @@ class Gates(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ConfigError("gates.latch", problem, nearest(self.latch, LATCHES))
         within("gates.hysteresis", self.hysteresis, 0.0, 1.0)
         within("gates.dwell_s", self.dwell_s, 0.0)
+        self._with("overall", self.overall)
+        for group, changes in (("modes", self.modes), ("classes", self.classes)):
+            for name, change in changes.items():
+                self._with(f"{group}.{name}", change)
+
+    def _with(self, place: str, change: GateChange) -> Gates:
+        """These gates with the change of one dimension, checked."""
+        given = {f: v for f in change.__struct_fields__ if (v := getattr(change, f)) is not None}
+        if not given:
+            return self
+        common = {f: getattr(self, f) for f in change.__struct_fields__}
+        try:
+            return Gates(**{**common, **given})
+        except ConfigError as e:
+            raise ConfigError(e.place.replace("gates", f"gates.{place}", 1), e.problem, e.hint) from None
+
+    def edges(self) -> Edges:
+        """What a level is judged by."""
+        extra = self.hysteresis
+        return Edges(
+            self.caution,
+            min(self.caution + extra, 1.0),
+            self.protective,
+            min(self.protective + extra, 1.0),
+            LATCHES[self.latch],
+            round(self.dwell_s * 1e9),
+        )
+
+    def of_overall(self) -> Gates:
+        """The gates of overall trust."""
+        return self._with("overall", self.overall)
+
+    def of_modes(self, taxonomy: Taxonomy) -> dict[str, Gates]:
+        """The gates of every accident mode, by code.
+
+        Raises:
+            ConfigError: a change for a mode that does not exist.
+        """
+        return self._of_all("modes", self.modes, taxonomy.codes)
+
+    def of_classes(self, taxonomy: Taxonomy) -> dict[str, Gates]:
+        """The gates of every precursor class, by id.
+
+        Raises:
+            ConfigError: a change for a class that does not exist.
+        """
+        return self._of_all("classes", self.classes, [c.id for c in taxonomy.classes])
+
+    def _of_all(self, group: str, changes: Mapping[str, GateChange], known: Iterable[str]) -> dict[str, Gates]:
+        known = tuple(known)
+        for name in changes:
+            if name not in known:
+                raise ConfigError(f"gates.{group}.{name}", "no such dimension of trust", nearest(name, known))
+        return {name: self._with(f"{group}.{name}", changes.get(name, GateChange())) for name in known}
 
 
 LATCHES: Mapping[str, int] = {
@@ -84,48 +180,61 @@ class TrustState(msgspec.Struct, frozen=True):
     at_ns: int = -1
     overall: float = 1.0
     by_mode: Mapping[str, float] = {}
+    by_class: Mapping[str, float] = {}
     unobserved_ns: Mapping[str, int] = {}
 
 
 class TrustModel:
-    """Trust over a fixed set of configured kinds."""
+    """Trust over a fixed set of configured kinds: overall, by accident mode and by precursor class."""
 
     def __init__(self, settings: TrustSettings, taxonomy: Taxonomy, kinds: Iterable[str]) -> None:
         self._settings = settings
         self._modes = {kind: taxonomy.modes_of(kind) for kind in kinds}
+        self._class = {kind: taxonomy.class_of(kind) for kind in self._modes}
+        self._watching = {code: {k for k, modes in self._modes.items() if code in modes} for code in taxonomy.codes}
+        self._all_seen = {code: 1.0 if watched else 0.0 for code, watched in self._watching.items()}
 
     def step(
         self, state: TrustState, risk: RiskEstimate, unobserved: Sequence[str], now_ns: int
     ) -> tuple[TrustState, Trust, bool]:
         """Next state, trust now, and whether some kind is unobserved for longer than the grace time."""
+        settings = self._settings
         since = {kind: state.unobserved_ns.get(kind, now_ns) for kind in unobserved}
-        overdue = any(now_ns - t > self._settings.grace_s * 1e9 for t in since.values())
-        gain = 1.0 if state.at_ns < 0 else 1.0 - math.exp((state.at_ns - now_ns) / (self._settings.recovery_s * 1e9))
-        cap = self._settings.unobserved_cap
-        trust = _complement(risk.upper)
-        overall = _follow(state.overall, min(trust, cap) if unobserved else trust, gain)
-        by_mode = _complements(risk.by_mode)
-        targets = by_mode
-        if unobserved:
-            capped = {mode for kind in unobserved for mode in self._modes[kind]}
-            targets = {mode: min(t, cap) if mode in capped else t for mode, t in by_mode.items()}
-        before = state.by_mode
-        if targets == before:
-            control = targets.copy()
+        overdue = any(now_ns - t > settings.grace_s * 1e9 for t in since.values())
+        gain = 1.0 if state.at_ns < 0 else 1.0 - math.exp((state.at_ns - now_ns) / (settings.recovery_s * 1e9))
+        if settings.acts_on == "upper":
+            p, p_by_mode, p_by_class = risk.upper, risk.upper_by_mode, risk.upper_by_class
         else:
-            control = {
-                mode: t if t <= (old := before.get(mode, 1.0)) else _follow(old, t, gain) for mode, t in targets.items()
-            }
+            p, p_by_mode, p_by_class = risk.probability, risk.by_mode, risk.by_class
+        trust, by_mode, by_class = _complement(p), _complements(p_by_mode), _complements(p_by_class)
+        target, modes, classes, coverage = trust, by_mode, by_class, self._all_seen
+        if unobserved:
+            cap = settings.unobserved_cap
+            target = min(trust, cap)
+            modes = _capped(by_mode, {mode for kind in unobserved for mode in self._modes[kind]}, cap)
+            classes = _capped(by_class, {self._class[kind] for kind in unobserved}, cap)
+            coverage = self._coverage(unobserved)
+        overall = _follow(state.overall, target, gain)
+        control, control_by_class = _followed(state.by_mode, modes, gain), _followed(state.by_class, classes, gain)
         now = Trust(
             trust,
             overall,
             by_mode,
             control,
-            _complements(risk.by_class),
+            by_class,
             1.0 - len(unobserved) / len(self._modes) if self._modes else 0.0,
             tuple(sorted(unobserved)),
+            control_by_class,
+            coverage.copy(),
         )
-        return TrustState(now_ns, overall, control, since), now, overdue
+        return TrustState(now_ns, overall, control, control_by_class, since), now, overdue
+
+    def _coverage(self, unobserved: Sequence[str]) -> dict[str, float]:
+        """Share of the configured kinds of each mode that are observed; 0 where none is configured."""
+        return {
+            code: 1.0 - len(watched.intersection(unobserved)) / len(watched) if watched else 0.0
+            for code, watched in self._watching.items()
+        }
 
 
 def _complement(p: float) -> float:
@@ -138,6 +247,17 @@ def _complements(risks: Mapping[str, float]) -> dict[str, float]:
     return {group: 1.0 - p if 0.0 <= p <= 1.0 else 0.0 for group, p in risks.items()}
 
 
+def _capped(trust: Mapping[str, float], those: Collection[str], cap: float) -> dict[str, float]:
+    return {group: min(t, cap) if group in those else t for group, t in trust.items()}
+
+
+def _followed(before: Mapping[str, float], targets: dict[str, float], gain: float) -> dict[str, float]:
+    """Control-level trust of each group after a tick."""
+    if targets == before:
+        return targets.copy()
+    return {g: t if t <= (old := before.get(g, 1.0)) else _follow(old, t, gain) for g, t in targets.items()}
+
+
 def _follow(old: float, target: float, gain: float) -> float:
     return target if target <= old else old + (target - old) * gain
 
@@ -146,7 +266,7 @@ LEVELS = tuple(ProtectionLevel)
 NORMAL, CAUTION, PROTECTIVE, MINIMAL_RISK = map(int, LEVELS)
 
 
-class LevelState(msgspec.Struct, frozen=True):
+class LevelState(msgspec.Struct, frozen=True, gc=False):
     """One level's memory: the level that holds, and when each level was last demanded (-1: never)."""
 
     level: ProtectionLevel = ProtectionLevel.NORMAL
@@ -154,6 +274,7 @@ class LevelState(msgspec.Struct, frozen=True):
 
 
 FRESH = LevelState()
+NORMAL_LEVEL = ProtectionLevel.NORMAL
 
 
 def level_step(state: LevelState, gates: Gates, trust: float, overdue: bool, now_ns: int) -> LevelState:
@@ -161,30 +282,45 @@ def level_step(state: LevelState, gates: Gates, trust: float, overdue: bool, now
 
     Monotone over open-loop histories: pointwise lower trust never gives a lower level.
     """
-    if state.level is ProtectionLevel.NORMAL and trust >= gates.caution and not overdue:
+    return edge_step(state, gates.edges(), trust, overdue, now_ns)
+
+
+def edge_step(state: LevelState, edges: Edges, trust: float, overdue: bool, now_ns: int) -> LevelState:
+    """level_step, with what it asks of the gates worked out before."""
+    level = state.level
+    caution, caution_held, protective, protective_held, latch, dwell_ns = edges
+    if level is NORMAL_LEVEL and trust >= caution and not overdue:
         return state
-    held, latch, dwell_ns = int(state.level), LATCHES[gates.latch], round(gates.dwell_s * 1e9)
-    demanded = list(state.demanded_ns)
-    level = NORMAL
-    for candidate, edge in ((CAUTION, gates.caution), (PROTECTIVE, gates.protective), (MINIMAL_RISK, 0.0)):
-        holds = held >= candidate
-        gate = min(edge + gates.hysteresis, 1.0) if holds else edge
-        wanted = overdue if candidate == MINIMAL_RISK else not (trust >= gate)
-        if wanted:
-            demanded[candidate] = now_ns
-        last = demanded[candidate]
-        if wanted or (holds and (candidate >= latch or (last >= 0 and now_ns - last < dwell_ns))):
-            level = candidate
-    return LevelState(LEVELS[level], (demanded[0], demanded[1], demanded[2], demanded[3]))
+    held = int(level)
+    _, caution_ns, protective_ns, minimal_ns = state.demanded_ns
+    after = NORMAL
+    if not (trust >= (caution_held if held >= CAUTION else caution)):
+        caution_ns, after = now_ns, CAUTION
+    elif held >= CAUTION and (latch <= CAUTION or (caution_ns >= 0 and now_ns - caution_ns < dwell_ns)):
+        after = CAUTION
+    if not (trust >= (protective_held if held >= PROTECTIVE else protective)):
+        protective_ns, after = now_ns, PROTECTIVE
+    elif held >= PROTECTIVE and (latch <= PROTECTIVE or (protective_ns >= 0 and now_ns - protective_ns < dwell_ns)):
+        after = PROTECTIVE
+    if overdue:
+        minimal_ns, after = now_ns, MINIMAL_RISK
+    elif held >= MINIMAL_RISK and (latch <= MINIMAL_RISK or (minimal_ns >= 0 and now_ns - minimal_ns < dwell_ns)):
+        after = MINIMAL_RISK
+    return LevelState(LEVELS[after], (-1, caution_ns, protective_ns, minimal_ns))
 
 
 def levels_step(
-    states: Mapping[str, LevelState], gates: Gates, trust: Mapping[str, float], now_ns: int
-) -> dict[str, LevelState]:
-    """level_step of every accident mode, by its control-level trust; lost evidence is the overall level's concern."""
-    after: dict[str, LevelState] = {}
-    for mode, t in trust.items():
-        state = states.get(mode, FRESH)
-        calm = state.level is ProtectionLevel.NORMAL and t >= gates.caution  # as level_step itself begins
-        after[mode] = state if calm else level_step(state, gates, t, False, now_ns)
-    return after
+    states: Mapping[str, LevelState], edges: Mapping[str, Edges], trust: Mapping[str, float], now_ns: int
+) -> Mapping[str, LevelState]:
+    """edge_step of every accident mode or class, by its control-level trust and its own gates.
+
+    Lost evidence is the overall level's concern.
+    """
+    changed: dict[str, LevelState] = {}
+    for group, t in trust.items():
+        state = states.get(group, FRESH)
+        if state.level is not NORMAL_LEVEL or not t >= edges[group][0]:  # else edge_step would give it back
+            changed[group] = edge_step(state, edges[group], t, False, now_ns)
+    if not changed and states:
+        return states
+    return {**(states or dict.fromkeys(trust, FRESH)), **changed}

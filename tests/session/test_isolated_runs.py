@@ -114,6 +114,41 @@ def test_the_command_ends_with_one_message_and_exit_3(tmp_path: Path, kind: str)
     assert answer["errors"][0]["kind"] == f"twin {kind}"
 
 
+BLIND = "warning: no detector can see A1 coming: no kind of telemetry is tied to it"
+
+
+@pytest.mark.parametrize(
+    ("mode", "policies", "warnings"),
+    [
+        ("A1", "", [BLIND]),
+        ("A9", "", []),
+        ("A9", "[config]\npolicies = []\n", ["warning: policies is empty"]),
+        ("A1", "[config]\npolicies = []\n", [BLIND, "warning: policies is empty"]),
+    ],
+)
+def test_a_run_without_sight_or_means_says_so(tmp_path: Path, mode: str, policies: str, warnings: list[str]) -> None:
+    """Telemetry is tied to A9 (Table 3: stop not honoured after a delay) and A12, not to A1."""
+    file = tmp_path / "rogue.toml"
+    file.write_text(
+        SCENARIO.replace('"A1"', f'"{mode}"').replace("[config.supervisor]", f"{policies}[config.supervisor]")
+    )
+    said = _simulate(str(file)).stderr.splitlines()
+    assert [line.startswith(w) for line, w in zip(said, warnings, strict=True)] == [True] * len(warnings)
+    result = json.loads(_simulate(str(file), "--json").stdout)["result"]
+    assert [f"warning: {w}" for w in result["warnings"]] == said
+    assert json.loads(_simulate(str(file), "--supervisor", "off", "--json").stdout)["result"]["warnings"] == []
+
+
+def _simulate(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", "from foreshock.cli import main; main()", "simulate", *words],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+
+
 def test_a_twin_whose_step_does_not_divide_the_tick_is_refused(scenario: Scenario) -> None:
     config = {**scenario.config, "supervisor": {"period_s": 0.0015}}
     with pytest.raises(ConfigError, match=r"period_s.*not a multiple"):

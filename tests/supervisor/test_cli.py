@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from tests.rogues.plugins.entry_points import install
 
 GOOD = """
 [[detectors]]
@@ -59,6 +61,11 @@ def test_bad_input_is_one_error_and_exit_2(words: tuple[str, ...], message: str,
     [
         (GOOD + "[gates]\ncautoin = 0.5\n", "gates.cautoin: unknown key; did you mean 'caution'"),
         (GOOD.replace("telemetry", "telemetri"), "no plugin 'telemetri' is installed; did you mean 'telemetry'"),
+        (GOOD.replace("telemetry", "ladder"), "plugin 'ladder' offers no detector 'ladder'"),
+        (
+            GOOD + "[[policies]]\nuse = 'lader'\n",
+            "policies[0].use: no plugin 'lader' is installed; did you mean 'ladder'?",
+        ),
         (GOOD + "[gates]\ncaution = 'high'\n", "gates.caution: Expected `float`, got `str`, got 'high'"),
         (GOOD + "[gates]\ncaution = 0.1\n", "protective 0.3 <= caution 0.1 must hold"),
         (GOOD + "[gates\n", "not TOML"),
@@ -81,6 +88,44 @@ def test_a_good_configuration_passes(tmp_path: Path) -> None:
     done = foreshock("config", "check", str(file), "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["result"]["detectors"] == ["telemetry"]
+
+
+def test_a_wrong_detector_is_answered_with_detectors_only(tmp_path: Path) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text(GOOD.replace("telemetry", "ladder"))
+    hint = foreshock("config", "check", str(file)).stderr.partition("offers no detector 'ladder'")[2]
+    assert [word for word in ("ladder", "paper-gate", "fmu", "plants") if word in hint] == []
+    assert foreshock("detectors", "check", "telemetri").stderr.endswith("did you mean 'telemetry'?\n")
+
+
+def test_no_policies_is_a_warning(tmp_path: Path) -> None:
+    """Allowed, for a supervisor that is only to judge; but then the minimal risk condition alone protects."""
+    file = tmp_path / "robot.toml"
+    file.write_text("policies = []\n" + GOOD)
+    done = foreshock("config", "check", str(file))
+    assert done.returncode == 0
+    assert done.stdout.startswith("ok")
+    assert done.stderr == "warning: policies is empty: nothing intervenes before the minimal risk condition\n"
+    (warning,) = json.loads(foreshock("config", "check", str(file), "--json").stdout)["result"]["warnings"]
+    assert "policies is empty" in warning
+    file.write_text(GOOD)
+    assert foreshock("config", "check", str(file)).stderr == ""
+
+
+@pytest.mark.parametrize("words", [("taxonomy", "show"), ("config", "schema"), ("scenarios", "list")])
+def test_a_broken_plugin_is_said_to_be_left_out(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One line each, whole: the reason may be longer than the terminal is wide."""
+    gallery = install(tmp_path / "gallery", {"bad-import": "rogue_bad_import", "exits": "rogue_exits"})
+    here = str(Path(__file__).parents[2])
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(gallery), here, os.environ.get("PYTHONPATH", "")]))
+    done = foreshock(*words)
+    assert done.returncode == 0, done.stderr
+    first, second = done.stderr.splitlines()
+    assert first.startswith("plugin bad-import is left out: plugin bad-import: import failed: ")
+    assert "foreshock.detektor" in first
+    assert second.startswith("plugin exits is left out: plugin exits: import failed: SystemExit: ")
 
 
 def test_taxonomy_as_json() -> None:

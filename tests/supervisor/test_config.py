@@ -16,7 +16,7 @@ from foreshock.errors import BadInputError, ConfigError, MissingExtraError, Plug
 from foreshock.evidence import Window
 from foreshock.policy import PolicySpec, Proposal, Situation
 from foreshock.registry import Registry
-from foreshock.risk import LogisticExponential
+from foreshock.risk import LogisticExponential, RiskSettings
 from foreshock.supervisor import Supervisor
 from foreshock.testing import threshold_spec
 from foreshock.trust import Gates, TrustSettings
@@ -64,7 +64,7 @@ def test_a_good_file_gives_what_it_says(tmp_path: Path) -> None:
     config = load_config(write(tmp_path, GOOD))
     assert (config.supervisor.robot, config.supervisor.period_s) == ("talos", 0.01)
     assert config.window == Window(1.0, 0.0, "exponential")
-    assert config.risk == LogisticExponential(1.6, 2.5, 1.2)
+    assert config.risk == RiskSettings(b=2.5)
     assert config.trust == TrustSettings(0.5, 0.7, 0.3)
     assert config.gates == Gates(0.7, 0.3, 0.1, 1.0, "protective")
     assert config.detectors == (DetectorEntry("lean", None, {"value": "body/lean"}, {"threshold": 0.2}),)
@@ -73,7 +73,9 @@ def test_a_good_file_gives_what_it_says(tmp_path: Path) -> None:
 
 def test_the_defaults_are_the_paper_s() -> None:
     config = parse_config({"detectors": [{"use": "lean"}]}, "here")
-    assert (config.risk.a, config.risk.b, config.risk.c) == (1.6, 2.0, 1.2)
+    assert config.risk.model == "independent"
+    assert (config.risk.a, config.risk.b, config.risk.c) == (None, None, None)
+    assert LogisticExponential() == LogisticExponential(1.6, 2.0, 1.2)
     assert config.gates.protective == 0.3
     assert 0.5 <= config.window.length_s <= 1.5
 

@@ -198,7 +198,9 @@ def test_a_decision_names_precursors_samples_and_rule() -> None:
     assert action.reasons[0] == "A1 below the protective gate"
     assert set(action.reasons[1:]) == {f"{SLIP}@left", TORSO, COM}
     assert action in d.changes
-    for a in d.risk.attribution:
+    (why,) = [e for e in d.explanations if e.mode == "A1"]
+    assert (why.gate, len(why.attribution), len(why.smallest)) == (0.3, 3, 3)
+    for a in why.attribution:
         # leave one out of three: Eq. 1 at 3 less Eq. 1 at 2
         assert a.share == pytest.approx(0.8093 - 0.4546, abs=1e-4)
 

@@ -114,6 +114,37 @@ def test_two_plugins_with_one_id_are_refused(tmp_path: Path, monkeypatch: pytest
         registry.detectors()
 
 
+@pytest.mark.parametrize("name", ["telemetri", "ladder", "ladde", "fmu", "x"])
+def test_a_wrong_detector_is_answered_with_detectors_only(name: str) -> None:
+    """Also where nothing has been loaded, and where the name is that of a policy or twin."""
+    with pytest.raises(ConfigError) as caught:
+        Registry().detector(name, "detectors[0].use")
+    assert [word for word in ("ladder", "paper-gate", "fmu", "plants") if word in caught.value.hint] == []
+    assert "telemetry" in caught.value.hint or name != "telemetri"
+
+
+@pytest.mark.parametrize(("name", "nearest"), [("balance", "ladder"), ("lader", "ladder"), ("papergate", "paper-gate")])
+def test_a_wrong_policy_is_answered_with_policies_only(name: str, nearest: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        Registry().policy(name, "policies[0].use")
+    assert nearest in caught.value.hint
+    assert [word for word in ("telemetry", "grip", "fmu", "plants") if word in caught.value.hint] == []
+
+
+def test_a_wrong_twin_is_answered_with_twins_only() -> None:
+    with pytest.raises(ConfigError) as caught:
+        Registry().twin("balance", "twin.kind")
+    assert "fmu" in caught.value.hint
+    assert "ladder" not in caught.value.hint
+
+
+def test_a_hint_passes_over_broken_plugins_and_loads_nothing(registry: Registry) -> None:
+    """The registry that was asked stays as it was: a hint must not extend what a caller goes on with."""
+    with pytest.raises(ConfigError, match="did you mean 'knee-torque'"):
+        registry.detector("knee-torq", "detectors[0].use")
+    assert registry.detectors() == ()
+
+
 def _offers(*files: object) -> ModuleType:
     module = ModuleType("offers")
     module.foreshock_scenarios = hookimpl(lambda: files)  # type: ignore[attr-defined]  # a module made by hand

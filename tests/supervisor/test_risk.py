@@ -211,11 +211,15 @@ def test_estimate_is_eq_1_on_the_sums_overall_and_by_mode(found: list[Precursor]
 @given(PRECURSORS)
 def test_attribution_is_leave_one_out(found: list[Precursor]) -> None:
     risk = RISK.estimate(found)
-    assert [(a.kind, a.subject) for a in risk.attribution] == [(p.kind, p.subject) for p in found]
-    for k, a in enumerate(risk.attribution):
+    why = RISK.explain(found, 0.3)
+    assert why.probability == pytest.approx(risk.probability, abs=1e-12)
+    shares = {(a.kind, a.subject): a.share for a in why.attribution}
+    assert list(shares.values()) == sorted(shares.values(), reverse=True)
+    assert set(shares) == {(p.kind, p.subject) for p in found}
+    for k, p in enumerate(found):
         without = RISK.estimate(found[:k] + found[k + 1 :])
-        assert a.share == pytest.approx(risk.probability - without.probability, abs=1e-12)
-        assert a.share >= -1e-12
+        assert shares[p.kind, p.subject] == pytest.approx(risk.probability - without.probability, abs=1e-12)
+        assert shares[p.kind, p.subject] >= -1e-12
 
 
 @given(PRECURSORS, st.data())

@@ -19,7 +19,8 @@ NORMAL, CAUTION, PROTECTIVE, MINIMAL = ProtectionLevel
 
 
 def risk(p: float, upper: float | None = None, by_mode: dict[str, float] | None = None) -> RiskEstimate:
-    return RiskEstimate(p, p, p if upper is None else upper, 1.0, 1.0, {"A1": p} if by_mode is None else by_mode)
+    modes = {"A1": p} if by_mode is None else by_mode
+    return RiskEstimate(p, p, p if upper is None else upper, 1.0, 1.0, modes, upper_by_mode=modes)
 
 
 def model(settings: TrustSettings | None = None) -> TrustModel:

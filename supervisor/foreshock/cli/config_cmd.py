@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 import msgspec
-from rich.markup import escape
 
-from foreshock.cli.output import console, emit, notes
+from foreshock.cli.output import console, emit, left_out, warn
 from foreshock.config import config_schema, load_config
 from foreshock.registry import Registry
+from foreshock.session.simulate import warnings_of
 from foreshock.supervisor import Supervisor
 
 __all__ = ["config"]
@@ -29,9 +29,11 @@ def check(file: Path, as_json: bool) -> None:
     supervisor = Supervisor(load_config(file), file.parent)
     ids = [spec.id for spec in supervisor.detectors]
     supervisor.close()
+    warnings = warnings_of(supervisor)
     if as_json:
-        emit({"file": str(file), "detectors": ids, "config": supervisor.config})
+        emit({"file": str(file), "detectors": ids, "config": supervisor.config, "warnings": warnings})
     else:
+        warn(warnings)
         console.print(f"[green]ok[/] {file}: {len(ids)} detectors ({', '.join(ids)})")
 
 
@@ -39,7 +41,6 @@ def check(file: Path, as_json: bool) -> None:
 def schema() -> None:
     """Print the JSON schema of a configuration, with the settings of all installed plugins."""
     registry = Registry()
-    for broken in registry.load_all():
-        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {escape(broken.reason)}")
+    left_out(registry.load_all())
     generated = config_schema(registry.detectors(), registry.policies())
     click.echo(msgspec.json.format(msgspec.json.encode(generated, order="sorted"), indent=2).decode())

@@ -17,7 +17,7 @@ from foreshock.registry import Registry
 from foreshock.session.isolated import Failure, Job, run_all
 from foreshock.session.run import Run
 from foreshock.session.scenario import Scenario, find_scenario
-from foreshock.session.sweep import ArmSpec, Cell, CellResult, sweep
+from foreshock.session.sweep import ArmSpec, Cell, CellResult, Rate, sweep
 
 __all__ = ["demo"]
 
@@ -27,6 +27,8 @@ ARMS = (
     ArmSpec("the paper's gate alone", "on", "paper-gate"),
     ArmSpec("ladder", "on", "ladder"),
 )
+SHORT = ("unsupervised", "paper's gate", "ladder")
+"""The arms in the heads of the sweep table, which is to fit into 120 columns."""
 SHOWN = (ArmSpec("unsupervised (shadow)", "shadow", "ladder"), *ARMS[1:])
 """The first run is judged but not acted on, so that its P and T can be shown too."""
 
@@ -88,7 +90,7 @@ def demo(out: Path, seed: int, seeds: int, per_cell: int, workers: int, as_json:
     if not as_json:
         for label, run in shown:
             timeline(run, label)
-            console.print(summary(run) + "\n")
+            console.print(summary(run) + "\n", soft_wrap=True)
     points = cells(seeds, min(per_cell, seeds))
     with Progress(
         TextColumn("{task.description}"),
@@ -135,24 +137,27 @@ def _three(scenario: Scenario, seed: int) -> list[tuple[str, Run]]:
 
 def _print_sweep(results: list[CellResult]) -> None:
     """One row per severity: how many fell under each arm, and what the supervisor did otherwise."""
-    arms = [a.label for a in ARMS]
     rows = []
-    for k in range(0, len(results), len(arms)):
-        mine = results[k : k + len(arms)]
+    for k in range(0, len(results), len(ARMS)):
+        mine = results[k : k + len(ARMS)]
         cell = mine[0].cell
         acting = mine[1:]
         rows.append(
             (
                 cell.label if cell.factor == cell.label else f"{cell.factor} {cell.label}",
                 *(str(r.falls) for r in mine),
-                " / ".join(str(r.caused) for r in acting),
-                " / ".join(f"{r.false_interventions.k} of {r.false_interventions.n}" for r in acting),
-                " / ".join(f"{median(r.lead_s):.2f}" if r.lead_s else "–" for r in acting),
+                ", ".join(str(r.caused) for r in acting),
+                ", ".join(_fraction(r.false_interventions) for r in acting),
+                ", ".join(f"{median(r.lead_s):.2f}" if r.lead_s else "–" for r in acting),
             )
         )
-    falls = [f"fell: {a}" for a in arms]
+    falls = [f"fell:\n{a}" for a in SHORT]
     columns = (*falls, "caused", "false", "lead (s)")
-    title = "Sweep: 95% Wilson intervals, arms paired by seed; caused, false and lead: paper's gate / ladder"
+    title = "Sweep: 95% Wilson intervals, arms paired by seed; caused, false and lead: paper's gate, ladder"
     table(title, "severity", *columns, rows=rows, right=columns)
     if failed := sum(r.failures for r in results):
         console.print(f"[red]{failed} runs gave no result[/]")
+
+
+def _fraction(rate: Rate) -> str:
+    return f"{rate.k}/{rate.n}" if rate.n else "–"

@@ -10,7 +10,7 @@ from rich.markup import escape
 from foreshock.cli._installed import Extra, distribution_of, extra_of, installed
 from foreshock.cli._new_plugin import write_project
 from foreshock.cli.output import NEGATIVE, OK, console, emit, table
-from foreshock.errors import ConfigError, ForeshockError, nearest
+from foreshock.errors import ForeshockError
 from foreshock.registry import Registry
 from foreshock.taxonomy import builtin_taxonomy
 from foreshock.testing.spec_checks import Check, spec_checks
@@ -60,7 +60,7 @@ def check(name: str, as_json: bool) -> int:
     """
     registry = Registry()
     if name not in registry.names:
-        raise ConfigError("detectors check", f"no plugin {name!r} is installed", nearest(name, registry.names))
+        registry.detector(name, "detectors check")  # raises, with the nearest detector
     checks = _checks(name, registry)
     ok = all(c.ok for c in checks)
     if as_json:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 import traceback
 
 import click
@@ -12,13 +14,28 @@ from rich.markup import escape
 from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
-from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, emit, notes
+from foreshock.cli.events_cmd import events
+from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, TERMINATED, emit, notes
 from foreshock.cli.scenarios_cmd import scenarios
 from foreshock.cli.simulate_cmd import simulate
 from foreshock.cli.taxonomy_cmd import taxonomy
 from foreshock.errors import BadInputError, ForeshockError, TwinError, nearest
 
 __all__ = ["cli", "main"]
+
+
+class _Terminated(BaseException):
+    """SIGTERM came; as KeyboardInterrupt does, it passes what catches Exception, and unwinds what must be ended."""
+
+
+def _on_sigterm(*_: object) -> None:
+    # Once: a second one, which timeout(1) sends, must not cut the ending short. No SIG_IGN, which children inherit.
+    signal.signal(signal.SIGTERM, _on_another)
+    raise _Terminated
+
+
+def _on_another(*_: object) -> None:
+    pass
 
 
 class _Root(click.Group):
@@ -41,11 +58,11 @@ def cli() -> None:
     Precursors in, accident probability and trust, graded interventions out.
 
     Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a twin that failed;
-    130 interrupted.
+    130 interrupted (SIGINT); 143 ended by SIGTERM.
     """
 
 
-for command in (config, demo, detectors, scenarios, simulate, taxonomy):
+for command in (config, demo, detectors, events, scenarios, simulate, taxonomy):
     cli.add_command(command)
 
 
@@ -54,6 +71,8 @@ def main(args: list[str] | None = None) -> None:
     words = sys.argv[1:] if args is None else args
     as_json = "--json" in words
     code, kind, message = OK, "", ""
+    handles = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGTERM, _on_sigterm) if handles else None
     try:
         result = cli.main(words, prog_name="foreshock", standalone_mode=False)
         code = result if isinstance(result, int) else OK
@@ -61,6 +80,8 @@ def main(args: list[str] | None = None) -> None:
         code = e.exit_code
     except click.Abort:
         code, kind, message = INTERRUPTED, "interrupted", "interrupted"
+    except _Terminated:
+        code, kind, message = TERMINATED, "terminated", "ended by SIGTERM"
     except click.ClickException as e:
         code, kind, message = BAD_INPUT, "usage", e.format_message()
     except BadInputError as e:
@@ -75,6 +96,9 @@ def main(args: list[str] | None = None) -> None:
         code, kind, message = FAILED, "internal", f"internal failure: {type(e).__name__}: {e}"
         if os.environ.get("FORESHOCK_TRACEBACK"):
             traceback.print_exc()
+    finally:
+        if before is not None and code != TERMINATED:
+            signal.signal(signal.SIGTERM, before)
     if message:
         if as_json:
             emit(None, [{"kind": kind, "message": message}])

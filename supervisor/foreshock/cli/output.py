@@ -1,7 +1,7 @@
 """How commands print: tables for people, one JSON envelope for programs, one line for an error.
 
 Exit codes: 0 ok; 1 a negative result; 2 bad input; 3 an internal failure or a twin that failed;
-130 interrupted.
+130 interrupted (SIGINT); 143 ended by SIGTERM, children included.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import msgspec
@@ -17,9 +17,24 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-__all__ = ["BAD_INPUT", "FAILED", "INTERRUPTED", "NEGATIVE", "OK", "console", "emit", "notes", "table"]
+from foreshock.registry import Broken
 
-OK, NEGATIVE, BAD_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+__all__ = [
+    "BAD_INPUT",
+    "FAILED",
+    "INTERRUPTED",
+    "NEGATIVE",
+    "OK",
+    "TERMINATED",
+    "console",
+    "emit",
+    "left_out",
+    "notes",
+    "table",
+    "warn",
+]
+
+OK, NEGATIVE, BAD_INPUT, FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 SCHEMA = "foreshock/1"
 
 console = Console(highlight=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else 120)
@@ -44,6 +59,18 @@ def emit(result: Any, errors: list[dict[str, str]] | None = None) -> None:
     plain = _plain(msgspec.to_builtins(result))
     envelope = {"schema": SCHEMA, "ok": not errors, "result": plain, "errors": errors or []}
     sys.stdout.write(msgspec.json.format(msgspec.json.encode(envelope), indent=2).decode() + "\n")
+
+
+def left_out(broken: Iterable[Broken]) -> None:
+    """Say which plugins are missing from a result, one line each, and why."""
+    for b in broken:
+        notes.print(f"[yellow]plugin {escape(b.name)} is left out:[/] {escape(b.reason)}", soft_wrap=True)
+
+
+def warn(warnings: Iterable[str]) -> None:
+    """Say what is allowed but probably not meant, one line each."""
+    for warning in warnings:
+        notes.print(f"[yellow]warning: {escape(warning)}[/]", soft_wrap=True)
 
 
 def table(title: str, *columns: str, rows: Sequence[tuple[str, ...]], right: tuple[str, ...] = ()) -> None:

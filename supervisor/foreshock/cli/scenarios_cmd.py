@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import click
 import msgspec
-from rich.markup import escape
 
-from foreshock.cli.output import console, emit, notes, table
+from foreshock.cli.output import console, emit, left_out, table
 from foreshock.registry import Registry
 from foreshock.session.scenario import broken_scenarios, find_scenario, scenario_ids
 
@@ -24,8 +23,7 @@ def list_(as_json: bool) -> None:
     """List the scenarios of the installed plugins."""
     registry = Registry()
     known = scenario_ids(registry)
-    for broken in (*registry.load_all(), *broken_scenarios(registry)):
-        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {escape(broken.reason)}")
+    left_out((*registry.load_all(), *broken_scenarios(registry)))
     if as_json:
         emit([{"id": s.id, "mode": s.mode, "expect": s.expect, "title": s.title} for s in known.values()])
         return

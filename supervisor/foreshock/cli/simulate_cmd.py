@@ -11,7 +11,7 @@ import msgspec
 from rich.markup import escape
 from rich.progress import Progress
 
-from foreshock.cli.output import OK, console, emit, notes, table
+from foreshock.cli.output import OK, console, emit, notes, table, warn
 from foreshock.errors import BadInputError
 from foreshock.registry import Registry
 from foreshock.session.isolated import Job, run_one
@@ -93,8 +93,9 @@ def simulate(
     if as_json:
         emit(msgspec.structs.replace(run, series={}))
         return OK
+    warn(run.warnings)
     timeline(run)
-    console.print(summary(run))
+    console.print(summary(run), soft_wrap=True)
     if report is not None:
         console.print(f"report: {report}")
     return OK

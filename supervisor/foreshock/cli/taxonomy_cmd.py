@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from rich.markup import escape
 
-from foreshock.cli.output import console, emit, notes, table
+from foreshock.cli.output import console, emit, left_out, table
 from foreshock.registry import Registry
 from foreshock.taxonomy import builtin_taxonomy
 
@@ -25,8 +24,7 @@ def taxonomy() -> None:
 def show(as_json: bool, extend: Path | None) -> None:
     """Show classes, modes, cascades and kinds, those of installed plugins included."""
     registry = Registry()
-    for broken in registry.load_all():
-        notes.print(f"[yellow]plugin {broken.name} is left out:[/] {escape(broken.reason)}")
+    left_out(registry.load_all())
     full = builtin_taxonomy().extended(registry.precursors())
     if extend is not None:
         full = full.extended_from(extend)

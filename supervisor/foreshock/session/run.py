@@ -65,6 +65,7 @@ class Run(msgspec.Struct, frozen=True):
         series: columns over time, for plots; ``t_s`` is the first.
         digest: of all decisions, empty if not asked for.
         max_level: highest protection level of the mode, or minimal risk.
+        warnings: what of the configuration leaves the scenario's mode unwatched or unprotected.
     """
 
     scenario: str
@@ -86,3 +87,4 @@ class Run(msgspec.Struct, frozen=True):
     series: dict[str, list[float]] = {}
     digest: str = ""
     max_level: int = 0
+    warnings: tuple[str, ...] = ()

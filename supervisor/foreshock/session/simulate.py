@@ -14,7 +14,7 @@ from foreshock.session.scenario import Scenario
 from foreshock.supervisor import Supervisor
 from foreshock.twin import Twin, TwinEvent
 
-__all__ = ["simulate"]
+__all__ = ["simulate", "warnings_of"]
 
 AFTERMATH_S = 0.5
 """A run goes on for this long after the accident, so that its peak force is seen."""
@@ -111,7 +111,27 @@ def simulate(
         log.series,
         digest.digest if detail and judge is not None else "",
         log.max_level,
+        warnings_of(judge, scenario.mode) if judge is not None else (),
     )
+
+
+def warnings_of(supervisor: Supervisor, mode: str | None = None) -> tuple[str, ...]:
+    """What of a supervisor's configuration is allowed but leaves it without sight or without means.
+
+    Args:
+        supervisor: what runs.
+        mode: code of the accident mode that matters; None where any may.
+    """
+    found = []
+    if mode is not None:
+        taxonomy = supervisor.taxonomy
+        seen = {taxonomy.kind(k).id for spec in supervisor.detectors for k in spec.kinds}
+        if not seen & taxonomy.kinds_of(mode):
+            ids = ", ".join(spec.id for spec in supervisor.detectors)
+            found.append(f"no detector can see {mode} coming: no kind of {ids} is tied to it")
+    if not supervisor.config.policies:
+        found.append("policies is empty: nothing intervenes before the minimal risk condition")
+    return tuple(found)
 
 
 class _Log:
