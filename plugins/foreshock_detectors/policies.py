@@ -1,4 +1,4 @@
-"""First-party policies for A1: the paper's gate alone, and a ladder that begins with cheap, reversible actions."""
+"""First-party policies for A1: the paper's gate alone, a ladder that begins with cheap actions, a plain count."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foreshock.policy import ACTIONS, PolicySpec, Proposal, Situation
 from foreshock.records import ProtectionLevel
 from foreshock.taxonomy import builtin_taxonomy
 
-__all__ = ["Ladder", "LadderConfig", "PaperGate", "PaperGateConfig"]
+__all__ = ["CountRule", "CountRuleConfig", "Ladder", "LadderConfig", "PaperGate", "PaperGateConfig"]
 
 PROTOCOLS = ("step-suppression", "arm-reconfiguration", "compliance-tuning", "balance-lock")
 """The four safety protocols of section 3.3."""
@@ -43,6 +43,38 @@ class PaperGate:
         if level < ProtectionLevel.PROTECTIVE:
             return ()
         return [Proposal(a, 1.0, level, self._mode, f"{self._mode}: T below the protective gate") for a in PROTOCOLS]
+
+
+class CountRuleConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """mode: the accident mode whose cascade (Table 3) is counted; least: how many of its kinds act."""
+
+    mode: str = "A1"
+    least: int = 2
+
+    def __post_init__(self) -> None:
+        cascade = builtin_taxonomy().mode(self.mode, "mode").cascade
+        if not 1 <= self.least <= len(cascade):
+            raise ConfigError("least", f"{self.least!r} is not within 1..{len(cascade)}, the length of the cascade")
+
+
+class CountRule:
+    """All four protocols while so many of the cascade's kinds are in the window: a plain rule to compare with.
+
+    It asks no model. The level that it acts at is the protective one, whatever trust says.
+    """
+
+    def __init__(self, config: CountRuleConfig) -> None:
+        taxonomy = builtin_taxonomy()
+        self._mode, self._least = config.mode, config.least
+        self._cascade = frozenset(taxonomy.kind(k).id for k in taxonomy.mode(config.mode).cascade)
+
+    def propose(self, situation: Situation) -> Sequence[Proposal]:
+        """The four protocols at full strength while enough kinds are in the window."""
+        found = len(self._cascade.intersection([p.kind for p in situation.precursors]))
+        if found < self._least:
+            return ()
+        rule = f"{self._mode}: {found} of {len(self._cascade)} precursors of the cascade"
+        return [Proposal(a, 1.0, ProtectionLevel.PROTECTIVE, self._mode, rule) for a in PROTOCOLS]
 
 
 class LadderConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -115,7 +147,7 @@ class Ladder:
 
 @hookimpl
 def foreshock_policies() -> Sequence[PolicySpec]:
-    """The ladder and the paper's gate."""
+    """The ladder, the paper's gate, and a count to compare them with."""
     return [
         PolicySpec(
             "ladder",
@@ -124,4 +156,10 @@ def foreshock_policies() -> Sequence[PolicySpec]:
             summary="speed scale and step suppression early, all four protocols at T < 0.3",
         ),
         PolicySpec("paper-gate", PaperGate, PaperGateConfig, summary="all four protocols at T < 0.3, nothing before"),
+        PolicySpec(
+            "count-rule",
+            CountRule,
+            CountRuleConfig,
+            summary="all four protocols while two of the cascade's three precursors are present; no model",
+        ),
     ]

@@ -1,7 +1,7 @@
 """What flows: Sample -> Indication -> Precursor -> RiskEstimate -> Trust -> Intervention, bundled in a Decision.
 
-All records are frozen; times are integer nanoseconds on the source's timeline. Those that are made many times a tick are
-not tracked by the garbage collector: frozen trees of values cannot be part of a cycle.
+All records are frozen; times are integer nanoseconds on the source's timeline. Those made many times a tick are not
+tracked by the garbage collector: frozen trees of values cannot be part of a cycle.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
 from foreshock.cli.events_cmd import events
+from foreshock.cli.gates_cmd import gates
 from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, TERMINATED, emit, notes
 from foreshock.cli.scenarios_cmd import scenarios
 from foreshock.cli.simulate_cmd import simulate
@@ -62,7 +63,7 @@ def cli() -> None:
     """
 
 
-for command in (config, demo, detectors, events, scenarios, simulate, taxonomy):
+for command in (config, demo, detectors, events, gates, scenarios, simulate, taxonomy):
     cli.add_command(command)
 
 

@@ -27,7 +27,7 @@ JITTER = 1e-11
 
 
 def effective_number(r: Matrix) -> float:
-    """mu of all the kinds of a correlation matrix.
+    """Effective number (mu) of the kinds of a correlation matrix.
 
     Args:
         r: n x n, symmetric, unit diagonal, entries 0..1. Two feet that each correlate with the torso but not with each
@@ -90,7 +90,7 @@ class Capacity:
         self._known: dict[int, float] = {0: 0.0}
 
     def correlation(self, a: str, b: str) -> float:
-        """r of two kinds."""
+        """The correlation of two kinds."""
         return self._r.get(a, {}).get(b, 0.0)
 
     def correlated(self, kinds: Sequence[str]) -> bool:
@@ -99,11 +99,11 @@ class Capacity:
         return any(b in self._r[a] for i, a in enumerate(linked) for b in linked[i + 1 :])
 
     def of(self, kinds: Iterable[str]) -> float:
-        """mu of a multiset of kinds: one entry for each (kind, subject)."""
+        """Effective number of a multiset of kinds: one entry for each (kind, subject)."""
         return self.growth(list(kinds))[-1]
 
     def growth(self, kinds: Sequence[str]) -> list[float]:
-        """mu of the first 0, 1, 2, ... of these kinds."""
+        """Effective numbers of the first 0, 1, 2, ... of these kinds."""
         values, key, alone = [0.0], 0, 0
         inside: list[str] = []
         for kind in kinds:

@@ -23,7 +23,7 @@ class Element(NamedTuple):
 
 
 def cascade_lift(elements: Sequence[Element], links: Links) -> float:
-    """max over onset-ordered chains of the sum of link(i, j) min(s_i, s_j) over consecutive i, j.
+    """The largest sum of link(i, j) min(s_i, s_j) over consecutive i, j of an onset-ordered chain.
 
     A chain is a sequence of onsets, each strictly later than the one before, that uses each kind once.
     Never falls when an element, an onset or strength is added. With more than MOST_REPEATED linked kinds of which some

@@ -8,8 +8,8 @@ mu is the effective number of independent kinds (_capacity), lift that of the or
 kappa = 0 and full severity give Eq. 1 exactly; a duplicate adds nothing.
 
 A wrong R would hide risk. lower takes the upper end of every r and the lower end of every J; upper is the larger of
-Eq. 1 on the plain counts and of P* at R = I with the upper end of every J: mu and the lift fall as R grows, so that no R
-inside its interval, nor any other, gives more.
+Eq. 1 on the plain counts and of P* at R = I with the upper end of every J: mu and the lift fall as R grows, so that
+no R inside its interval, nor any other, gives more.
 """
 
 from __future__ import annotations

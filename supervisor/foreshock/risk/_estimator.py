@@ -1,8 +1,8 @@
-"""What every risk model shares: precursors grouped by mode and class, judged group by group, only where they changed."""
+"""What every risk model shares: precursors grouped by mode and class, judged only where a group changed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple, Protocol
 
@@ -56,7 +56,7 @@ NONE = Judged(0.0, 0.0, 0.0, 0.0, 0.0)
 class GroupedRisk:
     """A precursor counts overall, for its class, and for every mode that Tables 2 and 3 tie its kind to.
 
-    A group whose members are those of the last call keeps its figures: counts stay the same from tick to tick but for an
+    A group whose members are those of the last call keeps its figures: they stay the same from tick to tick but for an
     onset, a recurrence, an expiry, or a severity that rises.
 
     Args:
@@ -68,8 +68,8 @@ class GroupedRisk:
         self._groups = {k.id: ("", "/" + k.class_, *self._modes[k.id]) for k in taxonomy.kinds}
         self._codes = taxonomy.codes
         self._classes = tuple(c.id for c in taxonomy.classes)
-        self._before: list[tuple[object, ...]] = []
-        self._members: dict[str, list[Counted]] = {}
+        self._before: Sequence[tuple[object, ...]] = []
+        self._members: Mapping[str, Sequence[Counted]] = {}
         self._judged: dict[str, Judged] = {}
         self._last = self._assembled()
 

@@ -156,9 +156,8 @@ class RiskParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
             for k, link in enumerate(self.cascade)
         )
         checked = msgspec.structs.replace(self, correlation=pairs, cascade=links)
-        least = float(
-            np.linalg.eigvalsh(checked.matrix(sorted({kind for p in pairs for kind in p.kinds})))[0] if pairs else 1.0
-        )
+        kinds = sorted({kind for p in pairs for kind in p.kinds})
+        least = float(np.linalg.eigvalsh(checked.matrix(kinds))[0]) if pairs else 1.0
         if least < -1e-6:
             problem = f"not a correlation matrix: its smallest eigenvalue is {least:.3g}"
             raise ConfigError(f"{place}: correlation", problem, "; shrink the r towards 0")

@@ -59,12 +59,17 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """The supervisor's configuration, checked."""
         return parse_config(self.config, f"{self.id}: config")
 
-    def with_(self, parameters: Mapping[str, float] | None = None, policy: str | None = None) -> Scenario:
-        """This scenario with other parameter values or another policy."""
-        config = dict(self.config)
+    def with_(
+        self,
+        parameters: Mapping[str, float] | None = None,
+        policy: str | None = None,
+        config: Mapping[str, Any] | None = None,
+    ) -> Scenario:
+        """This scenario with other parameter values, another policy, or other tables of the configuration."""
+        tables = {**self.config, **(config or {})}
         if policy is not None:
-            config["policies"] = [{"use": policy}]
-        return msgspec.structs.replace(self, config=config, parameters={**self.parameters, **(parameters or {})})
+            tables["policies"] = [{"use": policy}]
+        return msgspec.structs.replace(self, config=tables, parameters={**self.parameters, **(parameters or {})})
 
 
 def load_scenario(path: Path) -> Scenario:
