@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import datetime
 import time
 
-__all__ = ["NS_PER_S", "cpu_ns", "monotonic_ns", "ns", "seconds"]
+__all__ = ["NS_PER_S", "cpu_ns", "monotonic_ns", "ns", "seconds", "today"]
 
 NS_PER_S = 1_000_000_000
 
@@ -27,3 +28,8 @@ def monotonic_ns() -> int:
 def cpu_ns() -> int:
     """CPU time of this process in nanoseconds."""
     return time.process_time_ns()
+
+
+def today() -> str:
+    """The date, UTC, as in ISO 8601; for provenance, never for a decision."""
+    return datetime.datetime.now(datetime.UTC).date().isoformat()

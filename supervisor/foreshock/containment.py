@@ -217,14 +217,18 @@ class Contained:
         if not isinstance(said, (list, tuple)) and (isinstance(said, (str, bytes)) or not isinstance(said, Sequence)):
             raise TypeError(f"update() gave {type(said).__name__}, a sequence of Indication is expected")
         checked: dict[Key, Indication] = {}
-        kinds, name = self.kinds, self.spec.id
+        kinds, name, latest_ns = self.kinds, self.spec.id, now_ns + AHEAD_NS
+        evidence: object = ()  # of the last sound one; indications of one update often share theirs
         for i in said:
-            sound = type(i) is Indication and i.kind in kinds and _is_sound(i, now_ns)
-            kind = i.kind if sound else self._kind_of(i, now_ns)
+            if type(i) is Indication and i.kind in kinds and _is_sound(i, latest_ns, evidence):
+                kind, evidence, taken = i.kind, i.evidence, _detached(i)
+            else:
+                kind = self._kind_of(i, now_ns)
+                taken = _plain(i, kind)
             key = (kind, i.subject, name)
             if key in checked:
                 raise ValueError(f"{i.kind}: two indications for subject {i.subject!r}")
-            checked[key] = _detached(i) if sound else _plain(i, kind)
+            checked[key] = taken
         return checked
 
     def _kind_of(self, i: object, now_ns: int) -> str:
@@ -249,18 +253,26 @@ class Contained:
         return kind
 
 
-STR, FLOAT = {str}, {float}
+def _is_sound(i: Indication, latest_ns: int, evidence: object) -> bool:
+    """Whether every field has just its declared type and range, as nearly always; else _kind_of and _plain judge.
 
-
-def _is_sound(i: Indication, now_ns: int) -> bool:
-    """Whether every field has just its declared type and range, as nearly always; else _kind_of and _plain judge."""
-    if type(i.evidence) is not tuple or type(i.measures) is not dict:
+    Args:
+        i: judged.
+        latest_ns: the latest stamp that it may have.
+        evidence: a tuple that was found sound before.
+    """
+    measures, refs = i.measures, i.evidence
+    if type(measures) is not dict:
         return False
-    for ref in i.evidence:
-        if type(ref) is not SampleRef or type(ref.channel) is not str or type(ref.stamp_ns) is not int:
+    if refs is not evidence:
+        if type(refs) is not tuple:
             return False
-    if i.measures and not (set(map(type, i.measures)) == STR and set(map(type, i.measures.values())) == FLOAT):
-        return False
+        for ref in refs:
+            if type(ref) is not SampleRef or type(ref.channel) is not str or type(ref.stamp_ns) is not int:
+                return False
+    for name, value in measures.items():
+        if type(name) is not str or type(value) is not float:
+            return False
     statistic, threshold, severity, tte = i.statistic, i.threshold, i.severity, i.time_to_event_s
     return (
         type(statistic) is type(threshold) is type(severity) is float
@@ -268,7 +280,7 @@ def _is_sound(i: Indication, now_ns: int) -> bool:
         and 0.0 <= severity <= 1.0
         and (tte is None or (type(tte) is float and 0.0 <= tte < math.inf))
         and type(i.stamp_ns) is int
-        and i.stamp_ns <= now_ns + AHEAD_NS
+        and i.stamp_ns <= latest_ns
         and type(i.present) is bool
         and type(i.subject) is type(i.unit) is str
     )

@@ -61,13 +61,23 @@ class BodyState(msgspec.Struct, frozen=True, gc=False):
     torso_roll_rad: float
 
 
+class _Frame:
+    """A frame's id, and live views on its placement in Pinocchio's data: to make them anew costs as much as to read."""
+
+    def __init__(self, data: Any, frame: int) -> None:
+        self.id = frame
+        self.translation, self.rotation = data.oMf[frame].translation, data.oMf[frame].rotation
+
+
 class Kinematics:
     """Evaluates a RobotModel. Holds Pinocchio's data and the names of the stream seen last; no history."""
 
     def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
         self._model = robot.model
         self._data: Any = robot.model.createData()
+        # live views as well
+        self._com, self._velocity, self._momentum = self._data.com[0], self._data.vcom[0], self._data.hg.vector
+        self._left, self._right, self._torso = (_Frame(self._data, f) for f in (robot.left, robot.right, robot.torso))
         self._vectors = BodyVectors(robot)
         self._frames: dict[str, int] = {}
 
@@ -83,16 +93,17 @@ class Kinematics:
         c, s = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
         n = math.hypot(c, s)
         c, s = (c / n, s / n) if n > 1e-6 else (1.0, 0.0)
-        torso = pin.updateFramePlacement(self._model, data, self._robot.torso).rotation[:, 2].tolist()
+        pin.updateFramePlacement(self._model, data, self._torso.id)
+        (_, _, tx), (_, _, ty), (_, _, tz) = self._torso.rotation.tolist()
         return BodyState(
             stamp_ns,
-            tuple(data.com[0].tolist()),
-            tuple(data.vcom[0].tolist()),
-            tuple(data.hg.vector.tolist()),
-            self._sole(self._robot.left),
-            self._sole(self._robot.right),
+            tuple(self._com.tolist()),
+            tuple(self._velocity.tolist()),
+            tuple(self._momentum.tolist()),
+            self._sole(self._left),
+            self._sole(self._right),
             (c, s),
-            math.atan2(s * torso[0] - c * torso[1], torso[2]),
+            math.atan2(s * tx - c * ty, tz),
         )
 
     def angular_velocity(self, frame: str) -> list[float] | None:
@@ -107,9 +118,9 @@ class Kinematics:
         angular: list[float] = velocity.angular.tolist()
         return angular
 
-    def _sole(self, frame: int) -> SolePose:
-        placement = pin.updateFramePlacement(self._model, self._data, frame)
-        velocity = pin.getFrameVelocity(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
-        x, y, z = placement.translation.tolist()
+    def _sole(self, frame: _Frame) -> SolePose:
+        pin.updateFramePlacement(self._model, self._data, frame.id)
+        velocity = pin.getFrameVelocity(self._model, self._data, frame.id, pin.LOCAL_WORLD_ALIGNED)
+        x, y, z = frame.translation.tolist()
         vx, vy, _ = velocity.linear.tolist()
-        return SolePose(x, y, z, vx, vy, placement.rotation.tolist())
+        return SolePose(x, y, z, vx, vy, frame.rotation.tolist())

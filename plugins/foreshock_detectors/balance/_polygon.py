@@ -76,7 +76,11 @@ def nearest_boundary_point(polygon: Polygon, x: float, y: float) -> Point:
     for bx, by in polygon:
         ex, ey = bx - ax, by - ay
         square = ex * ex + ey * ey
-        t = min(1.0, max(0.0, ((x - ax) * ex + (y - ay) * ey) / square)) if square > 0.0 else 0.0
+        t = ((x - ax) * ex + (y - ay) * ey) / square if square > 0.0 else 0.0
+        if not t > 0.0:
+            t = 0.0
+        elif t > 1.0:
+            t = 1.0
         px, py = ax + t * ex, ay + t * ey
         d = (x - px) * (x - px) + (y - py) * (y - py)
         if d < best:

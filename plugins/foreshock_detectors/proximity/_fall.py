@@ -26,6 +26,8 @@ from foreshock_detectors.proximity._kinematics import Array
 
 __all__ = ["Topple"]
 
+_NOWHERE = np.array(-math.inf)  # as an array, which numpy need not convert at every call
+
 
 class Topple:
     """The robot at one instant: where it stands and how high it reaches.
@@ -41,21 +43,24 @@ class Topple:
         self._radius = radius.repeat(2)
         z = self._ends[:, 2]
         low = z - self._radius
-        ground = low.min()
+        ground = low.item(low.argmin())
         self._height = z - ground
-        self._support = low <= ground + support_m
+        # what does not support the robot reaches nowhere
+        self._support = np.where(low <= ground + support_m, self._radius, _NOWHERE)
 
     def reaches_m(self, u: Array) -> tuple[float, float]:
         """(e, rho) of a fall in the horizontal direction u, shape (3,).
 
         e: where the support ends (m), from the origin of the robot's ends; rho: how far beyond it a fall reaches (m).
         """
+        # item of argmax is max, at a third of its cost
         x = self._ends.dot(u)
-        edge_m = float((x + self._radius)[self._support].max())
+        edges = x + self._support
+        edge_m = edges.item(edges.argmax())
         x -= edge_m
         np.hypot(x, self._height, x)
         x += self._radius
-        return edge_m, float(x.max())
+        return edge_m, x.item(x.argmax())
 
     def clearance_m(self, centre: Vec3, ends: Array, radius: Array) -> float:
         """X - rho in m for one human; negative where the fall can hit.
@@ -70,5 +75,6 @@ class Topple:
         # where he stands in the robot itself, any direction will do
         u = np.array((x / away, y / away, 0.0) if away > 1e-6 else (1.0, 0.0, 0.0))
         edge_m, reach_m = self.reaches_m(u)
-        nearest_m = float((ends.reshape(-1, 3).dot(u) - radius).min()) + (away if away > 1e-6 else x)
+        near = ends.reshape(-1, 3).dot(u) - radius
+        nearest_m: float = near.item(near.argmin()) + (away if away > 1e-6 else x)
         return nearest_m - edge_m - reach_m

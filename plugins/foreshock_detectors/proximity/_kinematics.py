@@ -38,6 +38,7 @@ class CapsuleKinematics:
         self._model = robot.model
         self._vectors = BodyVectors(robot)
         self._arrays = JointArrays(robot.model)
+        self._motions = self._arrays.velocities[:, :, None]
         capsules = robot.capsules
         n = len(capsules)
         self._joint = np.array([robot.model.getJointId(c.joint) for c in capsules], dtype=np.intp)
@@ -48,22 +49,22 @@ class CapsuleKinematics:
         self._local, self._moved = np.zeros((n, 8, 4)), np.zeros((n, 8, 3))
         self._local[:, :4, :3], self._local[:, 4:6, :3] = places, ends
         self._local[:, 3:6, 3] = 1.0
-        self._rates = self._local[:, 6:, :3]
-        self.placements, self._ends, self._both = self._moved[:, :4], self._moved[:, 4:6], self._moved[:, 4:]
+        self._rates = self._local.reshape(n, 32, 1)[:, 24:]
+        self.placements, self.ends, self._both = self._moved[:, :4], self._moved[:, 4:6], self._moved[:, 4:]
         self._by_axis = np.zeros((4, 3, n)).transpose(2, 0, 1)
         self.axes, self.velocities = self._by_axis[:, :2], self._by_axis[:, 2:]
-        self._twist = np.zeros((n, 6, 6))  # (v, w) of the joint to both ends' velocities, in its axes
+        # (v, w) of the joint to both ends' velocities in its axes, in homogeneous coordinates
+        self._twist = np.zeros((n, 8, 6))
         for k, (a, b) in enumerate(ends):
-            self._twist[k, :3, :3] = self._twist[k, 3:, :3] = np.eye(3)
-            self._twist[k, :3, 3:], self._twist[k, 3:, 3:] = -pin.skew(a), -pin.skew(b)
+            self._twist[k, :3, :3] = self._twist[k, 4:7, :3] = np.eye(3)
+            self._twist[k, :3, 3:], self._twist[k, 4:7, 3:] = -pin.skew(a), -pin.skew(b)
         # a ball has no direction, and every product with its length is 0, so that any divisor will do
         self.length2: Array = np.maximum(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1), 1e-30)
         self.half_m: list[float] = half.tolist()
         self._fitted = np.array([c.radius for c in capsules])
         self._swept(robot)
         self.origin: Vec3 = (0.0, 0.0, 0.0)
-        self._places = np.zeros((n, 4, 3))
-        self.ends = np.zeros((n, 2, 3))
+        self._places, self._velocities = np.zeros((n, 4, 3)), np.zeros((n, 6, 1))
         self.radius, self.speed = self._fitted, np.zeros(n)
 
     def evaluate(self, joints: JointState, odometry: Odometry, odometry_lag_ns: int) -> None:
@@ -73,10 +74,9 @@ class CapsuleKinematics:
         q, v = vectors.q, vectors.v
         pin.forwardKinematics(self._model, arrays.data, q, v)
         places = arrays.placements.take(self._joint, 0, self._places, "clip")
-        rates = np.matmul(self._twist, arrays.velocities.take(self._joint, 0)[:, :, None])
-        self._rates[:] = rates.reshape(-1, 2, 3)
+        velocities = self._motions.take(self._joint, 0, self._velocities, "clip")
+        np.matmul(self._twist, velocities, self._rates)
         np.matmul(self._local, places, self._moved)
-        self.ends[:] = self._ends
         self._by_axis[:] = self._both
         if self._reach is not None:
             self._widen(self._reach, q, v)

@@ -8,11 +8,12 @@ import msgspec
 import numpy as np
 
 from foreshock.clock import NS_PER_S
+from foreshock.messages import Vec3
 from foreshock_detectors.proximity._closed_form import segment_distance_m
 from foreshock_detectors.proximity._config import ProximityConfig
 from foreshock_detectors.proximity._fall import Topple
 from foreshock_detectors.proximity._kinematics import Array, CapsuleKinematics
-from foreshock_detectors.proximity._pair import PlacedCapsule, checked_distance_m
+from foreshock_detectors.proximity._pair import Gauge, PlacedCapsule, checked_distance_m
 from foreshock_detectors.proximity._people import People, Person
 from foreshock_detectors.proximity._robot import Robot
 from foreshock_detectors.proximity._scene import Scene
@@ -52,6 +53,7 @@ class NearestPairs:
     def __init__(self, config: ProximityConfig, robot: Robot) -> None:
         self._config, self._robot = config, robot
         self._scenes: dict[str, Scene] = {}
+        self._gauge = Gauge()
         self._turn = 0
 
     def evaluate(self, body: CapsuleKinematics, body_age_s: float, people: People, now_ns: int) -> list[Nearest]:
@@ -77,14 +79,12 @@ class NearestPairs:
             there = np.array(centre)
             i, j, point = self._scene(person).closest(body, there)
             distance_m = checked_distance_m(
-                _placed(body.ends[i], body.radius.item(i)),
-                _placed(person.ends[j] + there, person.radius.item(j)),
-                config.consistency_m,
+                _robot_capsule(body, i), _human_capsule(person, j, centre), config.consistency_m, self._gauge
             )
-            self._audit(body, person, there, distance_m)
+            self._audit(body, person, centre, distance_m)
             speeds = approach_speeds(body.axes, body.velocities, body.length2, point)
             speeds += body.speed
-            robot_speed_m_s = float(speeds.max())
+            robot_speed_m_s = speeds.item(speeds.argmax())
             clearance_m = None if topple is None else topple.clearance_m(centre, person.ends, person.end_radius)
             separation = protective_separation(
                 config,
@@ -96,15 +96,15 @@ class NearestPairs:
                 uncertainty_m=person.uncertainty_m,
                 fall_clearance_m=clearance_m,
             )
-            found.append(Nearest(distance_m, float(speeds[i]), robot_speed_m_s, separation))
+            found.append(Nearest(distance_m, speeds.item(i), robot_speed_m_s, separation))
         return found
 
-    def _audit(self, body: CapsuleKinematics, person: Person, there: Array, distance_m: float) -> None:
+    def _audit(self, body: CapsuleKinematics, person: Person, centre: Vec3, distance_m: float) -> None:
         """Refuse the closest pair if the pair whose turn it is is closer."""
-        k = len(person.radius)
-        i, j = divmod(self._turn % (len(body.radius) * k), k)
-        (a, b), (c, d) = body.ends[i].tolist(), (person.ends[j] + there).tolist()
-        radii_m = body.radius.item(i) + person.radius.item(j)
+        k = len(person.half_m)
+        i, j = divmod(self._turn % (len(body.half_m) * k), k)
+        (a, b, robot_m), (c, d, human_m) = _robot_capsule(body, i), _human_capsule(person, j, centre)
+        radii_m = robot_m + human_m
         # the balls around both are closer than the capsules themselves: mostly that is answer enough
         middles_m = 0.5 * math.hypot(a[0] + b[0] - c[0] - d[0], a[1] + b[1] - c[1] - d[1], a[2] + b[2] - c[2] - d[2])
         if middles_m - body.half_m[i] - person.half_m[j] - radii_m >= distance_m:
@@ -146,6 +146,12 @@ def approach_speeds(ends: Array, velocities: Array, length2: Array, point: Array
     return np.asarray(speeds, dtype=np.float64)
 
 
-def _placed(ends: Array, radius: float) -> PlacedCapsule:
-    a, b = ends.tolist()
-    return PlacedCapsule(a, b, radius)
+def _robot_capsule(body: CapsuleKinematics, i: int) -> PlacedCapsule:
+    a, b = body.ends[i].tolist()
+    return PlacedCapsule(a, b, body.radius.item(i))
+
+
+def _human_capsule(person: Person, j: int, centre: Vec3) -> PlacedCapsule:
+    x, y, z = centre
+    (ax, ay, az), (bx, by, bz) = person.segments[j]
+    return PlacedCapsule((ax + x, ay + y, az + z), (bx + x, by + y, bz + z), person.radius.item(j))

@@ -25,6 +25,7 @@ class Person(msgspec.Struct, frozen=True):
         radius: shape (k,), m.
         end_radius: the same for each end, shape (2 k,), m.
         half_m: half the length of each segment (m).
+        segments: the ends once more, as numbers of Python.
         centre: mean of the ends, in odom (m).
         velocity: of his trunk (m/s), None if it is not measured.
         speed_m_s: its magnitude.
@@ -37,6 +38,7 @@ class Person(msgspec.Struct, frozen=True):
     radius: Array
     end_radius: Array
     half_m: tuple[float, ...]
+    segments: list[tuple[Vec3, Vec3]]
     centre: Vec3
     velocity: Vec3 | None
     speed_m_s: float | None
@@ -119,13 +121,15 @@ def _person(pose: HumanPose, stamp_ns: int) -> Person:
     x, y, z = centre.tolist()
     speed = None if velocity is None else math.hypot(*velocity)
     radius = np.array([c.radius for c in pose.capsules])
+    ends -= centre
     return Person(
         id=pose.id,
         stamp_ns=stamp_ns,
-        ends=ends - centre,
+        ends=ends,
         radius=radius,
         end_radius=radius.repeat(2),
         half_m=tuple([0.5 * math.dist(c.a, c.b) for c in pose.capsules]),
+        segments=ends.tolist(),
         centre=(x, y, z),
         velocity=velocity,
         speed_m_s=speed,

@@ -11,6 +11,7 @@ import traceback
 import click
 from rich.markup import escape
 
+from foreshock.cli.calibrate_cmd import calibrate
 from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
@@ -63,7 +64,7 @@ def cli() -> None:
     """
 
 
-for command in (config, demo, detectors, events, gates, scenarios, simulate, taxonomy):
+for command in (calibrate, config, demo, detectors, events, gates, scenarios, simulate, taxonomy):
     cli.add_command(command)
 
 

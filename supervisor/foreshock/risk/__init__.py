@@ -1,7 +1,7 @@
 """From precursors to accident probability: Eq. 1 on plain counts, and its extension to correlated precursors."""
 
 from foreshock.risk._capacity import Capacity, choquet
-from foreshock.risk._cascade import cascade_lift
+from foreshock.risk._cascade import Element, cascade_lift
 from foreshock.risk._correlated import CorrelatedRisk
 from foreshock.risk._estimator import RiskModel
 from foreshock.risk._independent import IndependentRisk
@@ -12,6 +12,7 @@ from foreshock.risk._settings import RiskSettings
 __all__ = [
     "Capacity",
     "CorrelatedRisk",
+    "Element",
     "IndependentRisk",
     "Link",
     "LogisticExponential",
