@@ -1,4 +1,4 @@
-"""The model of docs/model.md by exhaustion: every support, every level set, every chain. Slow, and shares no code with it."""
+"""The model of docs/model.md by exhaustion: every support, every level set, every chain. It shares no code with it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from foreshock.records import Precursor
 from foreshock.risk import Link, Pair, Provenance, RiskParameters
 
-SOURCE = Provenance("a test")
+SOURCE = Provenance(source="a test")
 KINDS = (
     "foot-micro-slip",
     "torso-angular-spike",
@@ -174,4 +174,6 @@ def bounds(found: Sequence[Precursor], parameters: RiskParameters) -> tuple[floa
 
 
 def parameters_of(correlation: Sequence[Pair] = (), cascade: Sequence[Link] = (), **fields: float) -> RiskParameters:
-    return RiskParameters("of-a-test", SOURCE, correlation=tuple(correlation), cascade=tuple(cascade), **fields)  # type: ignore[arg-type]
+    return RiskParameters(
+        name="of-a-test", provenance=SOURCE, correlation=tuple(correlation), cascade=tuple(cascade), **fields
+    )

@@ -33,7 +33,7 @@ def any_matrices(draw: st.DrawFn, most: int = 6) -> np.ndarray:
 
 @st.composite
 def gram_matrices(draw: st.DrawFn, most: int = 6, least: int = 1) -> np.ndarray:
-    """A correlation matrix: cosines of vectors >= 0, so that equal ones are duplicates and few dimensions make it singular."""
+    """Cosines of vectors >= 0: a correlation matrix, singular where dimensions are few, with duplicates."""
     n, d = draw(st.integers(least, most)), draw(st.integers(1, 4))
     rows = draw(
         st.lists(st.lists(st.integers(0, 3), min_size=d, max_size=d).filter(any), min_size=n, max_size=n), label="rows"

@@ -1,14 +1,14 @@
 """The axioms of the correlated model, each on 1000 random cases, against a brute force that shares no code with it.
 
-Tolerances: mu's maximum v has |v|^2 <= v'Rv = 1'v <= n since R >= 0, so that errors of 1e-11 in R's entries, rounding and
-all, move mu by less than 1e-9 for the sets here, and P by less, since dP/dm <= a/4 <= 1 and dP/dq <= c <= 3.
+Tolerances: mu's maximum v has |v|^2 <= v'Rv = 1'v <= n since R >= 0, so that errors of 1e-11 in R's entries, rounding
+and all, move mu by less than 1e-9 for the sets here; P by a few times that, since dP/dm <= a/4 <= 1 and dP/dq <= c <= 3.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import msgspec
 import numpy as np
@@ -150,7 +150,7 @@ def test_mu_grows_with_the_set_and_does_not_depend_on_order(r: np.ndarray, data:
     for k in range(len(order) + 1):
         assert growth[k] == pytest.approx(capacity.of(order[:k]), abs=CLOSE)
         assert growth[k] == pytest.approx(capacity.of(sorted(order[:k])), abs=CLOSE)
-    for before, after in zip(growth, growth[1:], strict=False):
+    for before, after in pairwise(growth):
         assert before - CLOSE <= after <= before + 1.0 + CLOSE
 
 
@@ -178,7 +178,7 @@ def test_two_subjects_of_a_kind_do_not_correlate(r: np.ndarray, picked: list[int
 @THOUSAND
 @given(st.floats(0.0, 1.0))
 def test_two_feet_that_each_correlate_with_the_torso(r: float) -> None:
-    """Indefinite from r^2 > 1/2 on. (1, r, r): v = (1 - 2r, 1 - r, 1 - r) / (1 - 2 r^2) while r <= 1/2, else the feet alone."""
+    """Indefinite from r^2 > 1/2 on. v = (1 - 2r, 1 - r, 1 - r) / (1 - 2 r^2) while r <= 1/2, else the feet alone."""
     expected = (3.0 - 4.0 * r) / (1.0 - 2.0 * r * r) if r <= 0.5 else 2.0
     capacity = Capacity({("foot", "torso"): r})
     assert capacity.of(["torso", "foot", "foot"]) == pytest.approx(expected, abs=CLOSE)
@@ -272,7 +272,7 @@ def best_by_time(found: Sequence[Element], links: dict[tuple[str, str], float]) 
     """The best chain by dynamic programming over (last onset, kinds used): exact for many kinds too."""
     kinds = sorted({e.kind for e in found})
     ends: list[tuple[int, Element, dict[int, float]]] = []
-    for at, e in sorted(((t, e) for e in found for t in e.onsets), key=lambda x: x[0]):
+    for at, e in sorted(((t, x) for x in found for t in x.onsets), key=lambda x: x[0]):
         mine = {1 << kinds.index(e.kind): 0.0}
         for before, last, table in ends:
             if before < at:
@@ -310,7 +310,7 @@ def test_eq_1_exactly_without_correlation_and_cascades(
     found: list[Precursor], eq_1: LogisticExponential, presence: float, named_pairs: bool
 ) -> None:
     pairs = [Pair((a, b), 0.0, 0.0, 0.0) for a, b in combinations(KINDS, 2)] if named_pairs else []
-    links = [Link(a, b, 1.0, 0.0, 2.0) for a, b in zip(KINDS, KINDS[1:], strict=False)]
+    links = [Link(a, b, 1.0, 0.0, 2.0) for a, b in pairwise(KINDS)]
     fields = {"a": eq_1.a, "b": eq_1.b, "c": eq_1.c, "kappa": 0.0, "presence": presence}
     risk = model(parameters_of(pairs, links, **fields).check(TAXONOMY, "a test")).estimate(found)
 
@@ -371,7 +371,7 @@ DUPLICATE = "sway-amplitude-increase"
 @THOUSAND
 @given(precursors(4, 1), parameters(), st.data())
 def test_a_duplicate_adds_nothing(found: list[Precursor], p: RiskParameters, data: st.DataObject) -> None:
-    """r = 1 with one kind and that kind's r with all others; no worse than the original, and in no cascade of its own."""
+    """r = 1 with one kind and its r with all others; no worse than the original, and in no cascade of its own."""
     original, rest = found[0], [x for x in found[1:] if x.kind != found[0].kind]
     rows = [
         Pair((DUPLICATE, other), x.r, x.low, x.high)
@@ -434,7 +434,7 @@ def test_an_ordered_cascade_weighs_at_least_as_much_as_the_unordered(found: list
 
 def test_the_cascade_of_a1_weighs_more_in_its_order() -> None:
     a1 = TAXONOMY.mode("A1").cascade
-    p = parameters_of(cascade=[Link(a, b, 1.0, 0.0, 1.0) for a, b in zip(a1, a1[1:], strict=False)])
+    p = parameters_of(cascade=[Link(a, b, 1.0, 0.0, 1.0) for a, b in pairwise(a1)])
     risk = model(p.check(TAXONOMY, "a test"))
 
     def at(*onsets: int) -> RiskEstimate:

@@ -2,9 +2,9 @@
 
     minimise  -sum_i [y_i ln P_i + (1 - y_i) ln(1 - P_i)] + sum_k ((u_k - u0_k) / s_k)^2 / 2
 
-over u = (ln a, b, ln c, ln kappa), with the paper's values as u0 (kappa: 1). The prior decides where the data do not: c
-shows only where few occurrences are seen. Intervals are 95%, by the sandwich H^-1 (sum over groups g g') H^-1, since the
-moments of one run are not independent.
+over u = (ln a, b, ln c, ln kappa), with the paper's values as u0 (kappa: 1). The prior decides where the data do not:
+c shows only where few occurrences are seen. Intervals are 95%, by the sandwich H^-1 (sum over groups g g') H^-1, since
+the moments of one run are not independent.
 """
 
 from __future__ import annotations

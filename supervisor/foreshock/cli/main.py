@@ -19,6 +19,7 @@ from foreshock.cli.events_cmd import events
 from foreshock.cli.gates_cmd import gates
 from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, TERMINATED, emit, notes
 from foreshock.cli.scenarios_cmd import scenarios
+from foreshock.cli.sensitivity_cmd import sensitivity
 from foreshock.cli.simulate_cmd import simulate
 from foreshock.cli.taxonomy_cmd import taxonomy
 from foreshock.errors import BadInputError, ForeshockError, TwinError, nearest
@@ -64,7 +65,7 @@ def cli() -> None:
     """
 
 
-for command in (calibrate, config, demo, detectors, events, gates, scenarios, simulate, taxonomy):
+for command in (calibrate, config, demo, detectors, events, gates, scenarios, sensitivity, simulate, taxonomy):
     cli.add_command(command)
 
 
