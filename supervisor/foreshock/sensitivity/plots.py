@@ -42,7 +42,7 @@ def sobol_figure(indices: Mapping[str, Sequence[Index]]) -> Figure:
         panel.barh(y + 0.2, [i.total for i in mine], 0.4, color=TOTAL, xerr=[i.total_half for i in mine], label="total")
         panel.barh(y - 0.2, [i.first for i in mine], 0.4, color=FIRST, xerr=[i.first_half for i in mine], label="first")
         panel.set_title(title, fontsize=10)
-        panel.set_xlim(-0.05, 1.05)
+        panel.set_xlim(-0.2, 1.05)
         panel.grid(axis="x", alpha=0.3, lw=0.5)
         panel.set_xlabel("share of the variance")
     panels[0].set_yticks(range(len(mine)), [i.name for i in mine], fontsize=9)
