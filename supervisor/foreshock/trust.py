@@ -321,6 +321,7 @@ def levels_step(
         state = states.get(group, FRESH)
         if state.level is not NORMAL_LEVEL or not t >= edges[group][0]:  # else edge_step would give it back
             changed[group] = edge_step(state, edges[group], t, False, now_ns)
-    if not changed and states:
+    if not changed and len(states) == len(trust):
         return states
-    return {**(states or dict.fromkeys(trust, FRESH)), **changed}
+    # a reset leaves dimensions out, which begin afresh
+    return {group: changed.get(group) or states.get(group, FRESH) for group in trust}

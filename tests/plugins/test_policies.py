@@ -9,8 +9,16 @@ import pytest
 from foreshock._strict import convert
 from foreshock.errors import ConfigError
 from foreshock.policy import Situation
-from foreshock.records import ProtectionLevel
-from foreshock_detectors.policies import PROTOCOLS, Ladder, LadderConfig, PaperGate, PaperGateConfig
+from foreshock.records import Precursor, ProtectionLevel
+from foreshock_detectors.policies import (
+    PROTOCOLS,
+    CountRule,
+    CountRuleConfig,
+    Ladder,
+    LadderConfig,
+    PaperGate,
+    PaperGateConfig,
+)
 
 
 def situation(level: ProtectionLevel, overall: float = 1.0) -> Situation:
@@ -57,3 +65,20 @@ def test_speed_never_rises_when_trust_falls_and_nan_is_slowest() -> None:
 def test_settings_that_would_fail_open_are_refused(settings: dict[str, object], message: str) -> None:
     with pytest.raises(ConfigError, match=message.replace("(", r"\(")):
         convert(settings, LadderConfig, "policies[0].config")
+
+
+def test_the_count_rule_acts_on_two_of_the_cascade_whatever_trust_says() -> None:
+    rule = CountRule(CountRuleConfig())
+    seen = [
+        Precursor(kind, "", "ongoing", 1.0, 1.0, 1.0, 0, "d") for kind in ("foot-micro-slip", "torso-angular-spike")
+    ]
+    other = Precursor("grip-micro-slip", "", "ongoing", 1.0, 1.0, 1.0, 0, "d")
+
+    def asked(*precursors: Precursor) -> set[str]:
+        trusting = Situation(0, {}, {}, 1.0, ProtectionLevel.NORMAL, precursors, None)
+        return {p.action for p in rule.propose(trusting)}
+
+    assert asked(*seen) == set(PROTOCOLS)
+    assert asked(seen[0], other) == asked(seen[0]) == asked() == set()
+    with pytest.raises(ConfigError, match=r"least: 4 is not within 1\.\.3"):
+        CountRuleConfig(least=4)

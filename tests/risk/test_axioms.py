@@ -1,7 +1,7 @@
 """The axioms of the correlated model, each on 1000 random cases, against a brute force that shares no code with it.
 
-Tolerances: mu's maximum v has |v|^2 <= v'Rv = 1'v <= n since R >= 0, so that errors of 1e-11 in R's entries, rounding
-and all, move mu by less than 1e-9 for the sets here; P by a few times that, since dP/dm <= a/4 <= 1 and dP/dq <= c <= 3.
+Tolerances: the maximum v of mu has |v|^2 <= v'Rv = 1'v <= n since R >= 0, so that errors of 1e-11 in R, rounding
+and all, move mu by less than 1e-9 for the sets here; P by a few times that: dP/dm <= a/4 <= 1 and dP/dq <= c <= 3.
 """
 
 from __future__ import annotations

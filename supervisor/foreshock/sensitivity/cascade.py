@@ -58,8 +58,8 @@ RANGES = {
     "severity": (0.0, 1.0),
     "gate": (0.2, 0.6),
 }
-"""Uniform, for the global analysis: half to one and a half of the paper's a and c, b as the paper perturbs it, the window
-from the shortest overlap that the paper reports to twice the longest."""
+"""Uniform, for the global analysis: half to one and a half of the paper's a and c, b as the paper perturbs it, the
+window from the shortest overlap that the paper reports to twice the longest."""
 
 
 class Outcome(msgspec.Struct, frozen=True):
