@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import click
 import msgspec
-from rich.markup import escape
 from rich.progress import Progress
 
 from foreshock.cli.output import OK, console, emit, notes, table
@@ -192,8 +191,9 @@ def _print(p: RiskParameters, scores: list[Score], moments: int, accidents: int)
         )
         for name in ("a", "b", "c", "kappa")
     ]
-    title = f"P within {p.horizon_s:g} s, window {p.window_s:g} s; {moments} moments, {accidents} before an accident"
-    table(escape(title), "parameter", "value", "95% interval", rows=rows, right=("value", "95% interval"))
+    what = f"P within {p.horizon_s:g} s, window {p.window_s:g} s; {moments} moments, {accidents} before an accident"
+    console.print(what, markup=False)
+    table("Fitted to all of them", "parameter", "value", "95% interval", rows=rows, right=("value", "95% interval"))
     scored = [
         (s.model, f"{s.brier:.4f}", f"{s.log_loss:.4f}", f"{s.difference:+.4f} ({s.low:+.4f} to {s.high:+.4f})")
         for s in scores
