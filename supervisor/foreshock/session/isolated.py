@@ -6,6 +6,7 @@ reuses them by reset. Everything temporary lies in one scratch folder that the p
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import signal
@@ -90,8 +91,11 @@ def _work(job: Job, scratch: str) -> Run:
 
 
 def _quiet(scratch: str) -> None:
-    """Worker start: what native code prints goes to a file, not into the results."""
+    """Worker start: it dies with its pool, and what native code prints goes to a file, not into the results."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        # prctl(PR_SET_PDEATHSIG, SIGKILL): no worker outlives a parent that was killed, not even in a native hang
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)
     sys.stdout.flush()
     fd = os.open(Path(scratch) / f"output-{os.getpid()}.log", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
     os.dup2(fd, 1)
