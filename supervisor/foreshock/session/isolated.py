@@ -6,12 +6,12 @@ reuses them by reset. Everything temporary lies in one scratch folder that the p
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import os
 import signal
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import TimeoutError as FutureTimeout
 from contextlib import contextmanager
@@ -90,12 +90,18 @@ def _work(job: Job, scratch: str) -> Run:
         raise
 
 
+def _die_with(parent: int) -> None:
+    """End this process when its parent has ended, however that came about; a native hang lets this thread run."""
+    never = threading.Event()
+    while os.getppid() == parent:
+        never.wait(0.5)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def _quiet(scratch: str) -> None:
     """Worker start: it dies with its pool, and what native code prints goes to a file, not into the results."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform == "linux":
-        # prctl(PR_SET_PDEATHSIG, SIGKILL): no worker outlives a parent that was killed, not even in a native hang
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+    threading.Thread(target=_die_with, args=[os.getppid()], daemon=True).start()
     sys.stdout.flush()
     fd = os.open(Path(scratch) / f"output-{os.getpid()}.log", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
     os.dup2(fd, 1)
