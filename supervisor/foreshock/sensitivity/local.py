@@ -1,59 +1,75 @@
-"""One parameter at a time, as in the paper's discussion: a and c by 20%, b by 1; and its three qualitative claims."""
+"""One parameter at a time, as in the paper's discussion (section 4), and whether its three claims hold each time."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import msgspec
 
-from foreshock.sensitivity.cascade import PAPER, Outcome, outcome
-from foreshock.taxonomy import Taxonomy
+from foreshock.sensitivity.outcome import Outcome
+from foreshock.sensitivity.study import Study
 
-__all__ = ["Perturbed", "one_at_a_time"]
+__all__ = ["LOW", "Claims", "Perturbed", "one_at_a_time"]
 
-LOW, GATE = 0.3, 0.3
-"""P of an isolated precursor that still counts as low; the paper's gate."""
-
-STEPS = {
-    "a": (1.28, 1.92),
-    "b": (1.0, 3.0),
-    "c": (0.96, 1.44),
-    "window_s": (1.2, 1.8),
-    "kappa": (1.0,),
-    "r": (0.5,),
-}
-"""The paper's steps of a, b and c; 20% of the window; and what the extension adds to a model that had none of it."""
+LOW = 0.3
+"""P of an isolated precursor that still counts as low. The paper gives no figure; its own value is 0.12."""
 
 
-class Perturbed(msgspec.Struct, frozen=True):
-    """One perturbation: what changed, what came of it, and whether the paper's claims hold.
+class Claims(msgspec.Struct, frozen=True):
+    """The paper's claims, made into tests.
 
     Attributes:
-        name: of the parameter; ``""`` for the paper's values.
-        value: of it.
-        outcome: of the cascade.
-        low_when_isolated: P of one precursor stays low.
-        sharp: the second or third precursor is the steepest step, and the full cascade opens the gate.
-        recovers: P is back at 0 when the window has passed.
+        low: "low risk under isolated precursors": P stays below LOW for as long as one precursor lasts.
+        sharp: "sharp escalation under two to three co-occurring precursors": the second or the third raises P more than
+            the first did, and three give more than twice the P of one.
+        opens: what the escalation is for: trust is below the gate at the third precursor, if not before.
+        recovers: "recovery with decay": once the last condition has ended P only falls, to 0, and trust is back above
+            the gate within one window.
     """
 
-    name: str
-    value: float
-    outcome: Outcome
-    low_when_isolated: bool
+    low: bool
     sharp: bool
+    opens: bool
     recovers: bool
 
 
-def one_at_a_time(kinds: Sequence[str], taxonomy: Taxonomy) -> list[Perturbed]:
-    """The paper's values, then every perturbation."""
-    points = [("", 0.0, PAPER)]
-    points += [(n, v, msgspec.structs.replace(PAPER, **{n: v})) for n, values in STEPS.items() for v in values]
-    return [_judged(name, value, outcome(point, kinds, taxonomy)) for name, value, point in points]
+class Perturbed(msgspec.Struct, frozen=True):
+    """One perturbation.
+
+    Attributes:
+        factor: id of the parameter; ``""`` where nothing is perturbed.
+        value: of it.
+        answers: every output, by id.
+        claims: which of the paper's hold.
+    """
+
+    factor: str
+    value: float
+    answers: dict[str, float]
+    claims: Claims
 
 
-def _judged(name: str, value: float, o: Outcome) -> Perturbed:
-    steps = (o.p_first, o.p_second - o.p_first, o.p_third - o.p_second)
-    return Perturbed(
-        name, value, o, o.p_first < LOW, max(steps[1:]) > steps[0] and 1.0 - o.p_third < GATE, o.left == 0.0
+def one_at_a_time(study: Study) -> list[Perturbed]:
+    """The nominal values, then every step of every factor."""
+    points = [("", 0.0)] + [(f.id, step) for f in study.factors for step in f.steps]
+    found = []
+    for factor, value in points:
+        values = {factor: value} if factor else {}
+        claims = judged(study.outcomes(values), study.nominal["window"] if factor != "window" else value)
+        found.append(Perturbed(factor, value, study.answers(values), claims))
+    return found
+
+
+def judged(o: Mapping[str, Outcome], window_s: float) -> Claims:
+    """The claims of one set of parameters.
+
+    Args:
+        o: outcomes of all timelines.
+        window_s: length of the window.
+    """
+    first, second, third = o["cascade"].p_at
+    opens = o["cascade"].opened and o["cascade"].gate_s <= o["cascade"].onset_s[-1]
+    back = o["decay"].falls and o["decay"].recovery_s <= window_s
+    return Claims(
+        o["isolated"].peak < LOW, max(second - first, third - second) > first and third > 2.0 * first, opens, back
     )
