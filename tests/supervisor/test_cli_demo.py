@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from rich.console import Console
 
-from foreshock.cli import demo_cmd
+from foreshock.cli import demo_cmd, output
 from foreshock.session.sweep import CellResult, wilson
 
 
@@ -16,7 +17,10 @@ def result(cell: int, seeds: int, arm: str) -> CellResult:
 
 
 @pytest.mark.parametrize("seeds", [2, 50, 100])
-def test_the_sweep_table_has_one_line_a_row_at_120_columns(seeds: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_sweep_table_has_one_line_a_row_at_120_columns(
+    seeds: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(output, "console", Console(width=120, highlight=False))
     labels = [arm.label for arm in demo_cmd.ARMS]
     cells = demo_cmd.cells(seeds, max(1, seeds // 5))
     demo_cmd._print_sweep([result(c, max(5, seeds), label) for c in range(len(cells)) for label in labels])
