@@ -45,7 +45,7 @@ def effective_number(r: Matrix) -> float:
         if n <= LARGEST:
             return _on_every_support(r)
         # the eigenvalues of I + t (R - I) are 1 + t (w - 1): zero at t = 1 / (1 - w)
-        r = np.eye(n) + (r - np.eye(n)) / (1.0 - least)
+        r, least = np.eye(n) + (r - np.eye(n)) / (1.0 - least), 0.0
     ones = np.ones(n)
     v = np.linalg.solve(r, ones) if least > 1e-6 else -ones
     if (v < 0.0).any():
@@ -85,8 +85,8 @@ class Capacity:
             if value > 0.0 and a != b:
                 self._r.setdefault(a, {})[b] = value
                 self._r.setdefault(b, {})[a] = value
-        # each kind has four bits for how many subjects of it are in the set
-        self._code = {kind: 1 << (4 * k) for k, kind in enumerate(sorted(self._r))}
+        # each kind has 16 bits for how many subjects of it are in the set
+        self._code = {kind: 1 << (16 * k) for k, kind in enumerate(sorted(self._r))}
         self._known: dict[int, float] = {0: 0.0}
 
     def correlation(self, a: str, b: str) -> float:

@@ -83,7 +83,9 @@ class GroupedRisk:
 
     def estimate(self, precursors: Sequence[Precursor]) -> RiskEstimate:
         """The risk of these precursors; each (kind, subject) is one of them."""
-        counted = [(p.kind, p.subject, p.weight, p.occurrences, p.severity, p.onsets_ns) for p in precursors]
+        counted = [
+            (p.kind, p.subject, p.weight, p.occurrences, p.severity, p.onsets_ns or (p.onset_ns,)) for p in precursors
+        ]
         if counted != self._before:
             self._before = counted
             members: dict[str, list[Counted]] = {}

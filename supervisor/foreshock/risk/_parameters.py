@@ -155,7 +155,10 @@ class RiskParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
             )
             for k, link in enumerate(self.cascade)
         )
-        checked = msgspec.structs.replace(self, correlation=pairs, cascade=links)
+        try:
+            checked = msgspec.structs.replace(self, correlation=pairs, cascade=links)
+        except ConfigError as e:  # two names of one kind
+            raise ConfigError(f"{place}: {e.place}", e.problem, e.hint) from None
         kinds = sorted({kind for p in pairs for kind in p.kinds})
         least = float(np.linalg.eigvalsh(checked.matrix(kinds))[0]) if pairs else 1.0
         if least < -1e-6:
