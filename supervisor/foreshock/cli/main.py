@@ -107,4 +107,7 @@ def main(args: list[str] | None = None) -> None:
             emit(None, [{"kind": kind, "message": message}])
         else:
             notes.print(f"[bold red]error:[/] {escape(message)}", soft_wrap=True)
+    if code == TERMINATED:
+        # the interpreter gives signals back to the system while it ends: another SIGTERM then would change the exit code
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
     sys.exit(code)
