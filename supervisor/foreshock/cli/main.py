@@ -108,6 +108,6 @@ def main(args: list[str] | None = None) -> None:
         else:
             notes.print(f"[bold red]error:[/] {escape(message)}", soft_wrap=True)
     if code == TERMINATED:
-        # the interpreter gives signals back to the system while it ends: another SIGTERM then would change the exit code
+        # the interpreter gives signals back to the system while it ends: another SIGTERM would change the exit code
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
     sys.exit(code)
