@@ -108,6 +108,6 @@ def main(args: list[str] | None = None) -> None:
         else:
             notes.print(f"[bold red]error:[/] {escape(message)}", soft_wrap=True)
     if code == TERMINATED:
-        # the interpreter gives signals back to the system while it ends: another SIGTERM would change the exit code
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+        # the interpreter takes handlers back while it ends, but not this; no child is started any more that inherits it
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
     sys.exit(code)
