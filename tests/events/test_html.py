@@ -7,10 +7,11 @@ from pathlib import Path
 
 import msgspec
 
+from foreshock._picture import picture
 from foreshock.events import Event, Problem
 from foreshock.events._heatmaps import association_figure, matrix_figure, overlap_figure
 from foreshock.events.analyse import analyse
-from foreshock.events.html import _picture, write_events_report
+from foreshock.events.html import write_events_report
 from foreshock.events.summary import headline, text_tables
 from foreshock.events.synthetic import synthetic_events
 from foreshock.taxonomy import builtin_taxonomy
@@ -29,7 +30,7 @@ def page(path: Path, events: list[Event], **more) -> str:
     return path.read_text()
 
 
-def test_a_synthetic_event_is_said_at_the_head_and_on_every_picture(tmp_path: Path) -> None:
+def test_a_synthetic_event_is_said_at_the_head_and_on_everypicture(tmp_path: Path) -> None:
     text = page(tmp_path / "a.html", MIXED, problems=[PROBLEM])
     assert "SYNTHETIC: 1 of 5 events were drawn by a generator" in text
     assert "<title>SYNTHETIC: " in text
@@ -65,6 +66,6 @@ def test_no_events_make_a_page_too(tmp_path: Path) -> None:
     assert "0 events (0 codings)" in page(tmp_path / "a.html", [])
 
 
-def test_the_same_events_give_the_same_picture() -> None:
-    one, two = (_picture(overlap_figure(analyse(CODED, TAXONOMY))) for _ in range(2))
+def test_the_same_events_give_the_samepicture() -> None:
+    one, two = (picture(overlap_figure(analyse(CODED, TAXONOMY))) for _ in range(2))
     assert one == two

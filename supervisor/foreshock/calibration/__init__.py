@@ -5,7 +5,7 @@ from foreshock.calibration.correlation import correlation
 from foreshock.calibration.features import Features, features
 from foreshock.calibration.fit import Fitted, fit, predict
 from foreshock.calibration.landmarks import Landmark, Seen, landmarks
-from foreshock.calibration.lift import lifts, table_3
+from foreshock.calibration.lift import lifts
 
 __all__ = [
     "Bin",
@@ -22,5 +22,4 @@ __all__ = [
     "lifts",
     "predict",
     "reliability",
-    "table_3",
 ]

@@ -15,9 +15,8 @@ import numpy as np
 
 from foreshock.events.schema import Event
 from foreshock.risk import Link
-from foreshock.taxonomy import Taxonomy
 
-__all__ = ["lifts", "table_3"]
+__all__ = ["lifts"]
 
 SHRINK = 2.0
 FEWEST = 3
@@ -61,9 +60,3 @@ def lifts(events: Sequence[Event], seed: int = 0, draws: int = 200) -> tuple[Lin
         for i, j in itertools.permutations(range(len(kinds)), 2)
         if counts[i, j] >= FEWEST and (lift := float(point[i, j])) > 0.0
     )
-
-
-def table_3(taxonomy: Taxonomy) -> tuple[Link, ...]:
-    """The consecutive pairs of Table 3, J = 1; the table gives an order and no lift, hence low = 0."""
-    pairs = dict.fromkeys(p for m in taxonomy.modes for p in itertools.pairwise(taxonomy.kind(k).id for k in m.cascade))
-    return tuple(Link(first, then, 1.0, 0.0, 1.0) for first, then in pairs)

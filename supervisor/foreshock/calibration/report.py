@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +10,7 @@ import jinja2
 import numpy as np
 from matplotlib.figure import Figure
 
+from foreshock._picture import picture
 from foreshock.calibration.compare import Bin, Score
 from foreshock.risk import RiskParameters
 
@@ -40,16 +39,10 @@ def write_calibration_report(
             p=parameters,
             scores=scores,
             n=n,
-            reliability=_picture(_reliability(bins)),
-            correlation=_picture(_heat_map(parameters)) if parameters.correlation else "",
+            reliability=picture(_reliability(bins)),
+            correlation=picture(_heat_map(parameters)) if parameters.correlation else "",
         )
     )
-
-
-def _picture(figure: Figure) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
 def _reliability(bins: Mapping[str, Sequence[Bin]]) -> Figure:

@@ -8,9 +8,9 @@ from statistics import median
 
 import click
 import msgspec
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from foreshock.cli.output import NEGATIVE, OK, console, emit, notes, table
+from foreshock.cli._runs import runs_bar
+from foreshock.cli.output import NEGATIVE, OK, console, emit, table
 from foreshock.cli.simulate_cmd import summary, timeline
 from foreshock.errors import BadInputError, TwinError
 from foreshock.registry import Registry
@@ -92,23 +92,7 @@ def demo(out: Path, seed: int, seeds: int, per_cell: int, workers: int, as_json:
             timeline(run, label)
             console.print(summary(run) + "\n", soft_wrap=True)
     points = cells(seeds, min(per_cell, seeds))
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[failed]} failed"),
-        console=notes,
-        transient=True,
-    ) as bar:
-        task = bar.add_task("sweep", total=len(ARMS) * sum(len(c.seeds) for c in points), failed=0)
-        failed = 0
-
-        def done(_: int, result: Run | Failure) -> None:
-            nonlocal failed
-            failed += isinstance(result, Failure)
-            bar.update(task, advance=1, failed=failed)
-
+    with runs_bar("sweep", len(ARMS) * sum(len(c.seeds) for c in points)) as done:
         results = sweep(scenario, ARMS, points, workers, done)
     command = f"foreshock demo --seed {seed} --seeds {seeds} --per-cell {per_cell}"
     write_report(out / "report.html", "A1: fall onto human", shown, results, NOTES, command)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from foreshock.cli._runs import ranges, runs_bar
 from foreshock.cli.output import NEGATIVE, OK, console, emit, left_out, notes, table
 from foreshock.errors import BadInputError, ForeshockError
 from foreshock.events import SYNTHETIC, Event, Problem, read_events, write_events
@@ -126,27 +126,13 @@ def _seeds(_: click.Context, __: click.Parameter, given: str) -> range:
     return range(int(first), int(end))
 
 
-def _ranges(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, tuple[float, float]]:
-    found = {}
-    for item in given:
-        name, _equals, span = item.partition("=")
-        low, _colon, high = span.partition(":")
-        try:
-            found[name] = (float(low), float(high))
-        except ValueError:
-            name = ""
-        if not name:
-            raise click.BadParameter(f"{item!r} is not NAME=LOW:HIGH")
-    return found
-
-
 @events.command(name="record")
 @click.argument("scenarios", nargs=-1, required=True, metavar="SCENARIO...")
 @click.option("--seeds", callback=_seeds, required=True, metavar="FIRST:END", help="One run for each; END is not run.")
 @click.option(
     "--vary",
     multiple=True,
-    callback=_ranges,
+    callback=ranges,
     metavar="NAME=LOW:HIGH",
     help="Draw a parameter of the twin uniformly for each seed.",
 )
@@ -167,21 +153,12 @@ def record_(
     taxonomy = _taxonomy(None, registry)
     target(out)  # what cannot be written is known before the runs
     failures: list[Failure] = []
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[failed]} failed"),
-        console=notes,
-        transient=True,
-    ) as bar:
-        task = bar.add_task("runs", total=len(found) * len(seeds), failed=0)
+    with runs_bar("runs", len(found) * len(seeds)) as told:
 
-        def done(_: int, result: Run | Failure) -> None:
+        def done(k: int, result: Run | Failure) -> None:
             if isinstance(result, Failure):
                 failures.append(result)
-            bar.update(task, advance=1, failed=len(failures))
+            told(k, result)
 
         recorded = record(found, seeds, vary, workers=workers, done=done, taxonomy=taxonomy)
     write_events(out, recorded)

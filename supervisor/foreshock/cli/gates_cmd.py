@@ -8,34 +8,17 @@ from statistics import median
 
 import click
 import msgspec
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from foreshock.cli.output import OK, console, emit, notes, table
+from foreshock.cli._runs import ranges, runs_bar
+from foreshock.cli.output import OK, console, emit, table
 from foreshock.registry import Registry
 from foreshock.session.gates import GATES, GateResult, compare_gates
-from foreshock.session.isolated import Failure
-from foreshock.session.run import Run
 from foreshock.session.scenario import find_scenario
 
 __all__ = ["gates"]
 
 FIRST_SEED = 20_000
 """Nothing was tuned on seeds from here."""
-
-
-def ranges(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, tuple[float, float]]:
-    """NAME=LOW:HIGH by name."""
-    found = {}
-    for item in given:
-        name, _eq, span = item.partition("=")
-        low, colon, high = span.partition(":")
-        try:
-            found[name] = (float(low), float(high))
-        except ValueError:
-            colon = ""
-        if not colon or not found[name][0] <= found[name][1] or not all(map(math.isfinite, found[name])):
-            raise click.BadParameter(f"{item!r} is not NAME=LOW:HIGH")
-    return found
 
 
 @click.command()
@@ -73,23 +56,7 @@ def gates(
     each_s = sum(s.duration_s for s in calm)
     rounds = math.ceil(3600.0 * nominal_hours / each_s) if each_s else 0
     total = (1 + len(GATES)) * seeds + len(GATES) * len(calm) * rounds
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[failed]} failed"),
-        console=notes,
-        transient=True,
-    ) as bar:
-        task = bar.add_task("gates", total=total, failed=0)
-        failed = 0
-
-        def done(_: int, result: Run | Failure) -> None:
-            nonlocal failed
-            failed += isinstance(result, Failure)
-            bar.update(task, advance=1, failed=failed)
-
+    with runs_bar("gates", total) as done:
         every = range(first_seed, first_seed + seeds)
         nominal_seeds = range(first_seed, first_seed + rounds)
         results = compare_gates(found, calm, every, nominal_seeds, vary, workers, done=done)

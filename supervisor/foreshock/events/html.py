@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from foreshock._picture import picture
 from foreshock.errors import MissingExtraError
 from foreshock.events._problem import Problem
 from foreshock.events.analyse import Analysis
 from foreshock.events.schema import NO_ACCIDENT
 from foreshock.session.sweep import Rate
 from foreshock.taxonomy import Taxonomy, builtin_taxonomy
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["write_events_report"]
 
@@ -55,14 +50,14 @@ def write_events_report(
     titles = {m.code: m.title for m in full.modes} | {c.id: c.title for c in full.classes}
     titles |= {k.id: k.title for k in full.kinds} | {NO_ACCIDENT: "(no accident)"}
     fake = a.synthetic > 0
-    pictures = {"overlap": _picture(draw.overlap_figure(a))}
+    pictures = {"overlap": picture(draw.overlap_figure(a))}
     for name, ties, which in (
         ("class_given_outcome", a.by_class, "given_outcome"),
         ("class_given_name", a.by_class, "given_name"),
         ("kind_given_outcome", a.by_kind, "given_outcome"),
     ):
         if ties.names:
-            pictures[name] = _picture(draw.association_figure(ties, titles, which, fake))
+            pictures[name] = picture(draw.association_figure(ties, titles, which, fake))
     for name, matrix, text, ratio in (
         ("cooccurrence", a.cooccurrence, "Events with both kinds", False),
         ("lift", a.lift, "Lift of two kinds in one event", True),
@@ -71,7 +66,7 @@ def write_events_report(
         if matrix.names:
             classes = [full.class_of(kind) for kind in matrix.names]
             breaks = [k for k in range(1, len(classes)) if classes[k] != classes[k - 1]]
-            pictures[name] = _picture(draw.matrix_figure(matrix, text, titles, fake, breaks, ratio=ratio))
+            pictures[name] = picture(draw.matrix_figure(matrix, text, titles, fake, breaks, ratio=ratio))
     page = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     page.filters |= {"share": _share, "interval": _interval}
     source = files("foreshock").joinpath("data/events.html.j2").read_text()
@@ -89,12 +84,3 @@ def _share(rate: Rate) -> str:
 
 def _interval(rate: Rate) -> str:
     return f"{100 * rate.low:.1f}–{100 * rate.high:.1f}" if rate.n else "–"
-
-
-def _picture(figure: Figure) -> str:
-    import matplotlib as mpl
-
-    buffer = io.BytesIO()
-    with mpl.rc_context({"svg.hashsalt": "foreshock"}):  # the same events give the same file
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import statistics
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
 import jinja2
-from matplotlib.figure import Figure
 
+from foreshock._picture import picture
 from foreshock.report.plots import runs_figure, sweep_figure
 from foreshock.session.run import Run
 from foreshock.session.sweep import CellResult
 
 __all__ = ["write_report"]
-
-
-def _picture(figure: Figure) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
 def write_report(
@@ -54,7 +46,7 @@ def write_report(
             sweep=sweep,
             notes=notes,
             command=command,
-            runs_picture=_picture(runs_figure(runs)),
-            sweep_picture=_picture(sweep_figure(sweep)) if sweep else "",
+            runs_picture=picture(runs_figure(runs)),
+            sweep_picture=picture(sweep_figure(sweep)) if sweep else "",
         )
     )

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
 import jinja2
-from matplotlib.figure import Figure
 
+from foreshock._picture import picture
 from foreshock.sensitivity.local import LOW, Perturbed
 from foreshock.sensitivity.plots import sobol_figure, timelines_figure, tornado_figure
 from foreshock.sensitivity.sobol import Indices
@@ -54,14 +52,8 @@ def write_sensitivity_report(
             samples=samples,
             low=LOW,
             command=command,
-            timelines=_picture(timelines_figure(study, study.outcomes())),
-            tornado=_picture(tornado_figure(study, local)),
-            sobol=_picture(sobol_figure(study, indices)),
+            timelines=picture(timelines_figure(study, study.outcomes())),
+            tornado=picture(tornado_figure(study, local)),
+            sobol=picture(sobol_figure(study, indices)),
         )
     )
-
-
-def _picture(figure: Figure) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
