@@ -30,7 +30,7 @@ def page(path: Path, events: list[Event], **more) -> str:
     return path.read_text()
 
 
-def test_a_synthetic_event_is_said_at_the_head_and_on_everypicture(tmp_path: Path) -> None:
+def test_a_synthetic_event_is_said_at_the_head_and_on_every_picture(tmp_path: Path) -> None:
     text = page(tmp_path / "a.html", MIXED, problems=[PROBLEM])
     assert "SYNTHETIC: 1 of 5 events were drawn by a generator" in text
     assert "<title>SYNTHETIC: " in text
@@ -66,6 +66,6 @@ def test_no_events_make_a_page_too(tmp_path: Path) -> None:
     assert "0 events (0 codings)" in page(tmp_path / "a.html", [])
 
 
-def test_the_same_events_give_the_samepicture() -> None:
+def test_the_same_events_give_the_same_picture() -> None:
     one, two = (picture(overlap_figure(analyse(CODED, TAXONOMY))) for _ in range(2))
     assert one == two
