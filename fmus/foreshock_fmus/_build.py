@@ -22,6 +22,7 @@ __all__ = ["build_fmu", "default_cache", "find_plant", "plants"]
 
 _HERE = Path(__file__).parent
 _ADAPTER = _HERE / "adapter"
+_COMMON = _HERE / "common"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # equal content gives equal bytes
 _SUFFIX = {"Linux": ".so", "Darwin": ".dylib", "Windows": ".dll"}
 
@@ -88,14 +89,17 @@ def build_fmu(plant: str | Path, fmi_version: int = 3, cache: Path | None = None
 
 
 def _sources(folder: Path) -> dict[str, bytes]:
-    """All C files of the plant and what both FMI versions share of the adapter, by name."""
+    """All C files of the plant, the headers that plants share, and what both FMI versions share of the adapter."""
     own = {p.name: p.read_bytes() for p in sorted(folder.glob("*.[ch]"))}
     if not any(name.endswith(".c") for name in own):
         raise BadInputError(str(folder), "holds no C file", f"; expected {folder.name}.c")
-    shared = {p.name: p.read_bytes() for p in (_ADAPTER / n for n in ("adapter.c", "adapter.h", "plant.h"))}
+    parts = (*(_ADAPTER / n for n in ("adapter.c", "adapter.h", "plant.h")), *sorted(_COMMON.glob("*.h")))
+    shared = {p.name: p.read_bytes() for p in parts}
     for name in own:
         if name in shared or name in ("fmi2.c", "fmi3.c", "plant_vars.h", "plant_model.c"):
-            raise BadInputError(str(folder / name), "has the name of a file of the adapter", "; choose another name")
+            raise BadInputError(
+                str(folder / name), "has the name of a file of the adapter or of common/", "; choose another name"
+            )
     return own | shared
 
 

@@ -16,16 +16,21 @@ __all__ = [
     "Capsule",
     "Detection",
     "Detections",
+    "Gaze",
     "GripState",
     "Heartbeat",
     "HumanPose",
     "Humans",
+    "ImageStatistics",
     "Imu",
     "JointState",
     "Message",
+    "MotionCommand",
     "MotionPlan",
     "Odometry",
+    "PlannedPath",
     "Scalar",
+    "TaskPhase",
     "Vec3",
     "WrenchStamped",
     "is_finite",
@@ -83,13 +88,17 @@ class Odometry(Message, frozen=True):
 
 
 class Detection(msgspec.Struct, frozen=True):
-    """vision_msgs/Detection3D with its best hypothesis: track id, class, confidence 0..1, centre and size (m)."""
+    """vision_msgs/Detection3D with its best hypothesis: track id, class, confidence 0..1, centre and size (m).
+
+    visible is the share 0..1 of the object's expected outline that the camera sees (KITTI's occlusion, turned round).
+    """
 
     id: str
     class_id: str
     confidence: float
     center: Vec3
     size: Vec3 = (0.0, 0.0, 0.0)
+    visible: float = 1.0
 
 
 class Detections(Message, frozen=True):
@@ -165,8 +174,73 @@ class MotionPlan(Message, frozen=True):
     speed: float = 0.0
 
 
+class PlannedPath(Message, frozen=True):
+    """Where something is going to be (nav_msgs/Path with stamps): x, y (m), time from the stamp (s), row by row."""
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    time_from_start: tuple[float, ...]
+    frame_id: str = "odom"
+
+
+class MotionCommand(Message, frozen=True):
+    """What the robot's control and its operators ask of a motion now.
+
+    enabled: motion is permitted by whoever starts and stops it.
+    stop_requested: a protective stop has been asked for and has not been withdrawn (ISO 13850, ISO 10218-1).
+    speed: commanded speed (m/s); announced: a signal (light, sound) warns people of a start.
+    """
+
+    enabled: bool
+    stop_requested: bool
+    speed: float
+    announced: bool = False
+
+
+class TaskPhase(Message, frozen=True):
+    """Where the plan is: number of the phase under way, when it is due to end (s from the stamp; below 0: overdue)."""
+
+    phase: int
+    due_s: float
+
+
+class Gaze(Message, frozen=True):
+    """Where one human looks: unit vector from the head in frame_id, confidence 0..1 of the estimate."""
+
+    human_id: str
+    direction: Vec3
+    confidence: float = 1.0
+    frame_id: str = "odom"
+
+
+class ImageStatistics(Message, frozen=True):
+    """Of the newest camera image, each 0..1: mean luminance, RMS contrast, sharpness, share of saturated pixels.
+
+    sharpness is the variance of the Laplacian relative to that of the camera's reference image, cut off at 1.
+    """
+
+    luminance: float
+    contrast: float
+    sharpness: float
+    saturated: float = 0.0
+
+
 AnyMessage: TypeAlias = (
-    Scalar | JointState | Imu | WrenchStamped | Odometry | Detections | Humans | GripState | Heartbeat | MotionPlan
+    Scalar
+    | JointState
+    | Imu
+    | WrenchStamped
+    | Odometry
+    | Detections
+    | Humans
+    | GripState
+    | Heartbeat
+    | MotionPlan
+    | PlannedPath
+    | MotionCommand
+    | TaskPhase
+    | Gaze
+    | ImageStatistics
 )
 
 
@@ -180,7 +254,7 @@ _TOTAL: Mapping[type, Callable[[Any], float]] = {
     Imu: lambda m: _vectors(m.orientation, m.angular_velocity, m.linear_acceleration),
     WrenchStamped: lambda m: sum(m.force) + sum(m.torque),
     Odometry: lambda m: _vectors(m.position, m.orientation, m.linear, m.angular),
-    Detections: lambda m: sum([d.confidence + sum(d.center) + sum(d.size) for d in m.detections]),
+    Detections: lambda m: sum([d.confidence + d.visible + sum(d.center) + sum(d.size) for d in m.detections]),
     Humans: lambda m: sum(
         [
             h.uncertainty + sum(h.velocity or ()) + sum([sum(c.a) + sum(c.b) + c.radius for c in h.capsules])
@@ -192,6 +266,11 @@ _TOTAL: Mapping[type, Callable[[Any], float]] = {
     ),
     Heartbeat: lambda m: m.round_trip_s,
     MotionPlan: lambda m: sum(m.com) + m.speed,
+    PlannedPath: lambda m: sum(m.x) + sum(m.y) + sum(m.time_from_start),
+    MotionCommand: lambda m: m.speed,
+    TaskPhase: lambda m: m.phase + m.due_s,
+    Gaze: lambda m: sum(m.direction) + m.confidence,
+    ImageStatistics: lambda m: m.luminance + m.contrast + m.sharpness + m.saturated,
 }
 """Sum of all numbers of a message: finite only if every one is (or it overflows, which no physical quantity does)."""
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
+import numpy as np
 
 from foreshock._strict import convert, read_toml, within
 from foreshock.config import Config, parse_config
@@ -15,7 +17,46 @@ from foreshock.errors import ConfigError, ForeshockError, nearest
 from foreshock.registry import Broken, Registry
 from foreshock.taxonomy import builtin_taxonomy
 
-__all__ = ["Scenario", "broken_scenarios", "find_scenario", "load_scenario", "scenario_ids"]
+__all__ = ["Distribution", "Scenario", "broken_scenarios", "find_scenario", "load_scenario", "scenario_ids"]
+
+
+class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a parameter is drawn from: one of uniform, normal and choice.
+
+    Attributes:
+        uniform: low and high.
+        normal: mean and standard deviation; a draw beyond three of them is cut off there.
+        choice: the values, all as likely.
+    """
+
+    uniform: tuple[float, float] | None = None
+    normal: tuple[float, float] | None = None
+    choice: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        given = [v for v in (self.uniform, self.normal, self.choice) if v is not None]
+        if len(given) != 1:
+            raise ConfigError("distributions", f"{len(given)} of uniform, normal and choice are given; expected one")
+        values = given[0]
+        if not values or not all(math.isfinite(v) for v in values):
+            raise ConfigError("distributions", f"{list(values)!r} are not finite numbers")
+        if self.uniform is not None and not self.uniform[0] <= self.uniform[1]:
+            raise ConfigError("distributions.uniform", f"low {self.uniform[0]!r} is above high {self.uniform[1]!r}")
+        if self.normal is not None and self.normal[1] < 0.0:
+            raise ConfigError("distributions.normal", f"the standard deviation {self.normal[1]!r} is below 0")
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """A value."""
+        if self.uniform is not None:
+            return float(rng.uniform(*self.uniform))
+        if self.normal is not None:
+            mean, sd = self.normal
+            return mean + sd * float(np.clip(rng.standard_normal(), -3.0, 3.0))
+        return float(rng.choice(self.choice or (0.0,)))
+
+
+def _stream(seed: int, name: str) -> np.random.Generator:
+    return np.random.default_rng([0x73, seed, zlib.crc32(name.encode())])
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -30,6 +71,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         twin: kind of twin (``kind``) and its settings.
         config: the supervisor's configuration, inline.
         parameters: values of the twin's parameters, where they differ from its defaults; finite.
+        distributions: parameters that each seed draws anew.
         folder: where the file lies; relative paths start there.
     """
 
@@ -41,6 +83,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     twin: dict[str, Any]
     config: dict[str, Any]
     parameters: dict[str, float] = {}
+    distributions: dict[str, Distribution] = {}
     folder: str = ""
 
     def __post_init__(self) -> None:
@@ -52,6 +95,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         for name, value in self.parameters.items():
             if not math.isfinite(value):
                 raise ConfigError(f"{self.id}: parameters.{name}", f"{value!r} is not a finite number")
+        if both := sorted(self.parameters.keys() & self.distributions.keys()):
+            raise ConfigError(f"{self.id}: distributions.{both[0]}", "has a fixed value under parameters as well")
         if not isinstance(self.twin.get("kind"), str):
             raise ConfigError(f"{self.id}: twin.kind", "missing; it names a kind of twin, e.g. 'fmu'")
 
@@ -69,7 +114,21 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         tables = {**self.config, **(config or {})}
         if policy is not None:
             tables["policies"] = [{"use": policy}]
-        return msgspec.structs.replace(self, config=tables, parameters={**self.parameters, **(parameters or {})})
+        given = parameters or {}
+        return msgspec.structs.replace(
+            self,
+            config=tables,
+            parameters={**self.parameters, **given},
+            distributions={k: d for k, d in self.distributions.items() if k not in given},
+        )
+
+    def drawn(self, seed: int) -> dict[str, float]:
+        """The parameter values of this seed: fixed ones, and a draw from each distribution.
+
+        Each parameter has a stream of its own, so that one more distribution leaves the other draws as they are.
+        """
+        drawn = {name: d.draw(_stream(seed, name)) for name, d in self.distributions.items()}
+        return {**self.parameters, **drawn}
 
 
 def load_scenario(path: Path) -> Scenario:

@@ -56,7 +56,8 @@ def simulate(
             f"{scenario.id}: config.supervisor.period_s",
             f"{seconds(period):g} s is not a multiple of the twin's step of {seconds(twin.period_ns):g} s",
         )
-    twin.reset(scenario.parameters, seed)
+    parameters = scenario.drawn(seed)
+    twin.reset(parameters, seed)
     if judge is not None:
         judge.reset(seed)
     digest = DigestJournal()
@@ -97,7 +98,7 @@ def simulate(
         arm,
         policies,
         seed,
-        dict(scenario.parameters),
+        parameters,
         bool(accidents),
         outcome,
         events,

@@ -65,11 +65,51 @@ def _standing(h: float) -> tuple[Capsule, ...]:
 STANDING_ADULT: tuple[Capsule, ...] = _standing(STATURE_M)
 
 
-def placed(x_m: float, y_m: float, z_m: float, yaw_rad: float) -> tuple[Capsule, ...]:
-    """The standing adult with its feet at (x, y, z), facing yaw about the vertical (rad, from the x axis)."""
+def placed(
+    x_m: float, y_m: float, z_m: float, yaw_rad: float, lowered_m: float = 0.0, hand: tuple[float, ...] = ()
+) -> tuple[Capsule, ...]:
+    """The standing adult with its feet at (x, y, z), facing yaw about the vertical (rad, from the x axis).
+
+    Args:
+        x_m: where the feet are.
+        y_m: where the feet are.
+        z_m: where the feet are.
+        yaw_rad: where it faces.
+        lowered_m: hips, trunk, head and arms are lower by this: a crouch. The knees stay where they are.
+        hand: middle of the right hand, in the same frame as the feet; the arm is stretched from the shoulder to it.
+            Empty: the arm hangs.
+    """
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    knee_m = _KNEE * STATURE_M
 
     def move(p: Vec3) -> Vec3:
-        return (x_m + c * p[0] - s * p[1], y_m + s * p[0] + c * p[1], z_m + p[2])
+        z = p[2] if p[2] <= knee_m else max(knee_m, p[2] - lowered_m)
+        return (x_m + c * p[0] - s * p[1], y_m + s * p[0] + c * p[1], z_m + z)
 
-    return tuple(Capsule(k.region, move(k.a), move(k.b), k.radius) for k in STANDING_ADULT)
+    body = [Capsule(k.region, move(k.a), move(k.b), k.radius) for k in STANDING_ADULT]
+    if hand:
+        body[_RIGHT_ARM : _RIGHT_ARM + 3] = _stretched(body[_RIGHT_ARM].b, (hand[0], hand[1], hand[2]))
+    return tuple(body)
+
+
+_RIGHT_ARM = 9
+"""Where upper arm, forearm and hand of the right side begin in the template."""
+
+
+def _stretched(shoulder: Vec3, hand: Vec3) -> list[Capsule]:
+    """Upper arm, forearm and hand on the line from the shoulder to the hand, in the template's proportions."""
+
+    def at(share: float) -> Vec3:
+        return (
+            shoulder[0] + share * (hand[0] - shoulder[0]),
+            shoulder[1] + share * (hand[1] - shoulder[1]),
+            shoulder[2] + share * (hand[2] - shoulder[2]),
+        )
+
+    reach = _SHOULDER - 0.5 * (_FINGERTIP + _WRIST)
+    elbow, wrist = (_SHOULDER - _ELBOW) / reach, (_SHOULDER - _WRIST) / reach
+    return [
+        Capsule("upper-arm", at(elbow), shoulder, _UPPER_ARM_R),
+        Capsule("forearm", at(wrist), at(elbow), _FOREARM_R),
+        Capsule("hand", hand, at(wrist), _HAND_R),
+    ]

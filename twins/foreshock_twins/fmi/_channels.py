@@ -23,10 +23,12 @@ from foreshock_twins.fmi._variables import Variable, Variables
 __all__ = ["MESSAGES", "ChannelBinding", "read_channel", "steps_of"]
 
 MESSAGES: dict[str, type[msgspec.Struct]] = {cls.__name__: cls for cls in typing.get_args(AnyMessage)}
-TEMPLATES: dict[str, Callable[[float, float, float, float], tuple[Capsule, ...]]] = {"standing-adult": placed}
+TEMPLATES: dict[str, Callable[..., tuple[Capsule, ...]]] = {"standing-adult": placed}
 _CHANNEL = re.compile(r"[A-Za-z0-9_.-]+/[A-Za-z0-9_.-]+")
-_POSE = {"x": None, "y": None, "z": 0.0, "yaw": 0.0, "uncertainty": 0.0}
-_POSE_UNITS = {"x": "m", "y": "m", "z": "m", "yaw": "rad", "uncertainty": "m", "vx": "m/s", "vy": "m/s"}
+_POSE = {"x": None, "y": None, "z": 0.0, "yaw": 0.0, "uncertainty": 0.0, "lowered": 0.0}
+_HAND = ("hand_x", "hand_y", "hand_z")
+_POSE_UNITS = {"yaw": "rad", "vx": "m/s", "vy": "m/s"}
+"""Of a human's keys; what is not here is in m."""
 
 
 class ChannelBinding(msgspec.Struct, frozen=True):
@@ -68,20 +70,25 @@ class Struct(msgspec.Struct, frozen=True):
 
 
 class Human(msgspec.Struct, frozen=True):
-    """A human from a template of capsules, placed by variables: pose is x, y, z, yaw, uncertainty; velocity vx, vy."""
+    """A human from a template of capsules, placed by variables.
+
+    pose is x, y, z, yaw, uncertainty, lowered; hand the right hand's middle in the channel's frame, or nothing where
+    it hangs; velocity vx, vy.
+    """
 
     id: str
     template: str
     pose: tuple[Item, ...]
+    hand: tuple[Item, ...]
     velocity: tuple[Item, ...]
 
     def items(self) -> tuple[Item, ...]:
-        """Pose, then velocity."""
-        return self.pose + self.velocity
+        """Pose, then hand, then velocity."""
+        return self.pose + self.hand + self.velocity
 
     def reader(self, layout: Layout) -> Reader:
         """Places the template; a human who stands still is placed once."""
-        pose, velocity = layout.vector(self.pose), layout.vector(self.velocity)
+        pose, velocity = layout.vector(self.pose + self.hand), layout.vector(self.velocity)
         place, name = TEMPLATES[self.template], self.id
         last: tuple[Values, tuple[Capsule, ...]] | None = None
 
@@ -89,7 +96,7 @@ class Human(msgspec.Struct, frozen=True):
             nonlocal last
             at = pose(values)
             if last is None or last[0] != at:
-                last = (at, place(at[0], at[1], at[2], at[3]))
+                last = (at, place(at[0], at[1], at[2], at[3], at[5], tuple(at[6:])))
             v = velocity(values)
             return HumanPose(name, last[1], (v[0], v[1], 0.0) if v else None, at[4])
 
@@ -97,20 +104,24 @@ class Human(msgspec.Struct, frozen=True):
 
 
 class Row(msgspec.Struct, frozen=True):
-    """A message that holds a tuple of structs: Humans, Detections."""
+    """A message that holds a tuple of structs: Humans, Detections. when says of each part whether it is seen now."""
 
     cls: Callable[..., Any]
     parts: tuple[Source, ...]
+    when: tuple[Item, ...]
     frame_id: str
 
     def items(self) -> tuple[Item, ...]:
         """Those of all parts."""
-        return tuple(item for part in self.parts for item in part.items())
+        return (*self.when, *(item for part in self.parts for item in part.items()))
 
     def reader(self, layout: Layout) -> Reader:
-        """Reads part by part."""
+        """Reads part by part; a part is there while its ``when`` is above 0.5."""
         cls, frame, readers = self.cls, self.frame_id, tuple(part.reader(layout) for part in self.parts)
-        return lambda values: cls(tuple([read(values) for read in readers]), frame)
+        if all(item == 1.0 for item in self.when):
+            return lambda values: cls(tuple([read(values) for read in readers]), frame)
+        pairs = tuple(zip((layout.number(item) for item in self.when), readers, strict=True))
+        return lambda values: cls(tuple([read(values) for seen, read in pairs if seen(values) > 0.5]), frame)
 
 
 def steps_of(table: TomlTable, key: str, period_s: float, step_s: float) -> int:
@@ -145,12 +156,15 @@ def read_channel(table: TomlTable, step_ns: int, variables: Variables) -> Channe
 def _message(table: TomlTable, cls: type[msgspec.Struct], variables: Variables) -> Source:
     fields = table.table("fields")
     if cls is Humans:
-        humans = tuple(_human(t, variables) for t in table.tables("humans"))
+        tables = table.tables("humans")
+        humans = tuple(_human(t, variables) for t in tables)
         _check_ids(table, "humans", [h.id for h in humans])
-        return Row(Humans, humans, _frame(fields))
+        return Row(Humans, humans, _whens(tables, variables), _frame(fields))
     if cls is Detections:
-        rows = tuple(Struct(Detection, read_struct(t, Detection, variables)) for t in table.tables("detections"))
-        return Row(Detections, rows, _frame(fields))
+        tables = table.tables("detections")
+        whens = _whens(tables, variables)
+        rows = tuple(Struct(Detection, read_struct(t, Detection, variables, ("when",))) for t in tables)
+        return Row(Detections, rows, whens, _frame(fields))
     message = Struct(cls, read_struct(fields, cls, variables))
     if cls.__name__ == "JointState":
         _check_joints(fields, message, cls)
@@ -161,6 +175,13 @@ def _frame(fields: TomlTable) -> str:
     frame = fields.text("frame_id", "odom")
     fields.done()
     return frame
+
+
+def _whens(tables: Sequence[TomlTable], variables: Variables) -> tuple[Item, ...]:
+    """The variable of each part that says whether it is seen; 1 where none is named."""
+    return tuple(
+        read_item(t, "when", t.text("when"), "a flag", ("1",), variables) if t.has("when") else 1.0 for t in tables
+    )
 
 
 def _check_joints(fields: TomlTable, message: Struct, cls: type[msgspec.Struct]) -> None:
@@ -189,13 +210,20 @@ def _human(table: TomlTable, variables: Variables) -> Human:
         pose.append(_placing(table, key, variables))
     if table.has("vx") != table.has("vy"):
         table.fail("vy" if table.has("vx") else "vx", "is missing", "; give both components of the velocity, or none")
+    given = [key for key in _HAND if table.has(key)]
+    if given and len(given) < len(_HAND):
+        missing = next(key for key in _HAND if key not in given)
+        table.fail(missing, "is missing", "; give all three coordinates of the right hand, or none")
+    hand = tuple(_placing(table, key, variables) for key in given)
     velocity = tuple(_placing(table, key, variables) for key in ("vx", "vy") if table.has(key))
+    if table.has("when"):
+        table.text("when")
     table.done()
-    return Human(human_id, template, tuple(pose), velocity)
+    return Human(human_id, template, tuple(pose), hand, velocity)
 
 
 def _placing(table: TomlTable, key: str, variables: Variables) -> Item:
-    return read_item(table, key, table.raw(key), f"a human's {key}", (_POSE_UNITS[key],), variables)
+    return read_item(table, key, table.raw(key), f"a human's {key}", (_POSE_UNITS.get(key, "m"),), variables)
 
 
 def _check_ids(table: TomlTable, key: str, ids: Sequence[str]) -> None:

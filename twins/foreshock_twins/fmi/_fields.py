@@ -104,15 +104,41 @@ class Names(msgspec.Struct, frozen=True):
         return lambda values: tuple(name for name, read in readers if read(values) > 0.5)
 
 
-def read_struct(table: TomlTable, cls: type[msgspec.Struct], variables: Variables) -> tuple[Source, ...]:
-    """The sources of all fields of a message, in the order of its constructor.
+class Choice(msgspec.Struct, frozen=True):
+    """A text that changes: one of several, by a variable that counts from 0."""
+
+    item: Item
+    names: tuple[str, ...]
+    what: str
+
+    def items(self) -> tuple[Item, ...]:
+        """The number."""
+        return (self.item,)
+
+    def reader(self, layout: Layout) -> Reader:
+        """Picks; a number beyond the list is the FMU's error."""
+        read, names, what = layout.number(self.item), self.names, self.what
+
+        def chosen(values: Values) -> str:
+            value = read(values)
+            if not (value >= 0.0 and float(value).is_integer() and value < len(names)):
+                raise TwinError("error", f"{what} must be one of 0..{len(names) - 1}, the FMU gave {value!r}")
+            return names[int(value)]
+
+        return chosen
+
+
+def read_struct(
+    table: TomlTable, cls: type[msgspec.Struct], variables: Variables, beside: tuple[str, ...] = ()
+) -> tuple[Source, ...]:
+    """The sources of all fields of a message, in the order of its constructor; beside are other keys.
 
     Raises:
         ConfigError: an unknown or missing field, a wrong length or type, an unknown variable, another unit.
     """
     fields = {f.name: f for f in msgspec.structs.fields(cls)}
     for name in table.names():
-        if name not in fields:
+        if name not in fields and name not in beside:
             table.fail(name, f"{cls.__name__} has no such field", nearest(name, fields))
     hints = typing.get_type_hints(cls)
     sources: list[Source] = []
@@ -140,7 +166,7 @@ def read_item(
 def _source(table: TomlTable, key: str, message: str, hint: Any, variables: Variables) -> Source:
     value, what = table.raw(key), f"{message}.{key}"
     if hint is str:
-        return Literal(table.text(key))
+        return _text(table, key, what, variables)
     arguments = typing.get_args(hint)
     if typing.get_origin(hint) is tuple and arguments[0] is str:
         return _names(table, key, what, variables)
@@ -172,6 +198,19 @@ def _spread(table: TomlTable, key: str, value: object) -> list[object]:
             table.fail(key, f"{part!r} is an empty range")
         found += [f"{match[1]}[{i}]" for i in range(first, last + 1)]
     return found
+
+
+def _text(table: TomlTable, key: str, what: str, variables: Variables) -> Source:
+    """A text, or ``{ of = [texts], index = variable }``."""
+    if not isinstance(table.raw(key), dict):
+        return Literal(table.text(key))
+    choice = table.table(key)
+    texts = choice.raw("of")
+    if not (isinstance(texts, list) and texts and all(isinstance(t, str) for t in texts)):
+        choice.fail("of", f"is {texts!r}", "; expected a list of texts, the one at index is taken")
+    item = read_item(choice, "index", choice.text("index"), f"index of {what}", ("1",), variables)
+    choice.done()
+    return Choice(item, tuple(texts), what)
 
 
 def _names(table: TomlTable, key: str, what: str, variables: Variables) -> Source:

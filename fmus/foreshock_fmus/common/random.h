@@ -1,6 +1,6 @@
 /* Seeded random streams: xoshiro256** (Blackman, Vigna 2018) seeded by splitmix64, normal deviates by Box and Muller. */
-#ifndef BALANCE_RANDOM_H
-#define BALANCE_RANDOM_H
+#ifndef RANDOM_H
+#define RANDOM_H
 
 #include <math.h>
 #include <stdint.h>
