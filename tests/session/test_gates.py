@@ -10,10 +10,10 @@ from scipy.stats import poisson
 
 from foreshock.records import Intervention
 from foreshock.registry import Registry
-from foreshock.session.gates import GateResult, compare_gates, drawn, opened
+from foreshock.session.gates import compare_gates, drawn, opened
+from foreshock.session.rates import per_hour
 from foreshock.session.run import Run
 from foreshock.session.scenario import find_scenario
-from foreshock.session.sweep import wilson
 
 SECOND = 1_000_000_000
 
@@ -33,7 +33,8 @@ def test_a_gate_opens_when_the_first_action_begins() -> None:
 
 @pytest.mark.parametrize(("k", "hours"), [(0, 1.0), (3, 2.0)])
 def test_the_rate_per_hour_has_the_exact_poisson_interval(k: int, hours: float) -> None:
-    rate, low, high = GateResult("g", wilson(0, 1), wilson(0, 1), 0, wilson(0, 1), (), k, hours, 0).per_hour
+    found = per_hour(k, hours)
+    rate, low, high = found.per_hour, found.low, found.high
     assert rate == k / hours
     # by its definition: at each end what was seen, or more extreme, has a probability of 2.5%
     assert poisson.cdf(k, high * hours) == pytest.approx(0.025)

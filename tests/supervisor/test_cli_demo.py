@@ -6,7 +6,8 @@ import pytest
 from rich.console import Console
 
 from foreshock.cli import demo_cmd, output
-from foreshock.session.sweep import CellResult, wilson
+from foreshock.session.rates import wilson
+from foreshock.session.sweep import CellResult
 
 
 def result(cell: int, seeds: int, arm: str) -> CellResult:

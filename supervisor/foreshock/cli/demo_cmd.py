@@ -15,9 +15,10 @@ from foreshock.cli.simulate_cmd import summary, timeline
 from foreshock.errors import BadInputError, TwinError
 from foreshock.registry import Registry
 from foreshock.session.isolated import Failure, Job, run_all
+from foreshock.session.rates import Rate
 from foreshock.session.run import Run
 from foreshock.session.scenario import Scenario, find_scenario
-from foreshock.session.sweep import ArmSpec, Cell, CellResult, Rate, sweep
+from foreshock.session.sweep import ArmSpec, Cell, CellResult, sweep
 
 __all__ = ["demo"]
 

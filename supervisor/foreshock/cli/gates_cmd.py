@@ -61,27 +61,30 @@ def gates(
         nominal_seeds = range(first_seed, first_seed + rounds)
         results = compare_gates(found, calm, every, nominal_seeds, vary, workers, done=done)
     if as_json:
-        emit([{**msgspec.to_builtins(r), "per_hour": r.per_hour} for r in results])
+        emit(
+            [
+                {**msgspec.to_builtins(r), "per_hour": (r.nominal.per_hour, r.nominal.low, r.nominal.high)}
+                for r in results
+            ]
+        )
     else:
         _print(results, scenario, seeds)
     return OK
 
 
 def _print(results: list[GateResult], scenario: str, seeds: int) -> None:
-    rows = []
-    for r in results:
-        rate, low, high = r.per_hour
-        rows.append(
-            (
-                r.gate,
-                str(r.fell),
-                str(r.saved),
-                str(r.caused),
-                str(r.spared),
-                f"{median(r.lead_s):.2f}" if r.lead_s else "–",
-                "–" if math.isnan(rate) else f"{rate:.2f} ({low:.2f}–{high:.2f}) in {r.nominal_h:.1f} h",
-            )
+    rows = [
+        (
+            r.gate,
+            str(r.fell),
+            str(r.saved),
+            str(r.caused),
+            str(r.spared),
+            f"{median(r.lead_s):.2f}" if r.lead_s else "–",
+            str(r.nominal),
         )
+        for r in results
+    ]
     columns = ("fell", "saved", "caused", "false", "gate to fall (s)", "false per nominal hour")
     table(f"{scenario}, {seeds} seeds, 95% intervals", "gate", *columns, rows=rows, right=columns[:-1])
     if failures := sum(r.failures for r in results):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import click
 import msgspec
 
+from foreshock.cli._severity import severity_command
+from foreshock.cli._verify import verify_command
 from foreshock.cli.output import console, emit, left_out, table
 from foreshock.registry import Registry
 from foreshock.session.scenario import broken_scenarios, find_scenario, scenario_ids
@@ -41,3 +43,7 @@ def show(scenario: str, as_json: bool) -> None:
         emit(found)
     else:
         console.print_json(msgspec.json.encode(found).decode())
+
+
+scenarios.add_command(severity_command)
+scenarios.add_command(verify_command)

@@ -11,7 +11,7 @@ import numpy as np
 
 from foreshock.events.pairs import seen_kinds
 from foreshock.events.schema import NO_ACCIDENT, Event
-from foreshock.session.sweep import Rate, wilson
+from foreshock.session.rates import Rate, wilson
 from foreshock.taxonomy import Taxonomy
 
 __all__ = ["Association", "ChiSquare", "Tie", "class_association", "kind_association"]

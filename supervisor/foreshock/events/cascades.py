@@ -10,7 +10,7 @@ from math import factorial
 import msgspec
 
 from foreshock.events.schema import Event
-from foreshock.session.sweep import Rate, wilson
+from foreshock.session.rates import Rate, wilson
 from foreshock.taxonomy import Taxonomy
 
 __all__ = ["CascadeOrder", "SequenceCount", "cascade_orders", "common_sequences"]

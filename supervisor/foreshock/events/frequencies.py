@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import msgspec
 
 from foreshock.events.schema import Event
-from foreshock.session.sweep import Rate, wilson
+from foreshock.session.rates import Rate, wilson
 from foreshock.taxonomy import Taxonomy
 
 __all__ = ["ClassShare", "ModeFrequency", "class_shares", "mode_frequencies"]

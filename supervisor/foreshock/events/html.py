@@ -11,7 +11,7 @@ from foreshock.errors import MissingExtraError
 from foreshock.events._problem import Problem
 from foreshock.events.analyse import Analysis
 from foreshock.events.schema import NO_ACCIDENT
-from foreshock.session.sweep import Rate
+from foreshock.session.rates import Rate
 from foreshock.taxonomy import Taxonomy, builtin_taxonomy
 
 __all__ = ["write_events_report"]

@@ -8,7 +8,7 @@ from itertools import combinations
 import msgspec
 
 from foreshock.events.schema import Event
-from foreshock.session.sweep import Rate, wilson
+from foreshock.session.rates import Rate, wilson
 
 __all__ = ["WINDOWS_S", "OverlapPoint", "overlap"]
 

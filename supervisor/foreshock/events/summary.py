@@ -8,7 +8,7 @@ from itertools import combinations
 import msgspec
 
 from foreshock.events.analyse import Analysis
-from foreshock.session.sweep import Rate
+from foreshock.session.rates import Rate
 
 __all__ = ["TextTable", "headline", "text_tables"]
 

@@ -13,9 +13,9 @@ import msgspec
 import numpy as np
 
 from foreshock.session.isolated import Failure, Job, run_all
+from foreshock.session.rates import Frequency, Rate, per_hour, wilson
 from foreshock.session.run import Arm, Run
 from foreshock.session.scenario import Scenario
-from foreshock.session.sweep import Rate, wilson
 
 __all__ = ["GATES", "Gate", "GateResult", "compare_gates", "drawn"]
 
@@ -61,15 +61,9 @@ class GateResult(msgspec.Struct, frozen=True):
     failures: int
 
     @property
-    def per_hour(self) -> tuple[float, float, float]:
-        """False interventions per nominal hour, with the exact 95% Poisson interval (chi-square quantiles)."""
-        from scipy.stats import chi2
-
-        k, h = self.nominal_opened, self.nominal_h
-        if h == 0.0:
-            return float("nan"), 0.0, float("inf")
-        low = float(chi2.ppf(0.025, 2 * k)) / 2.0 if k else 0.0
-        return k / h, low / h, float(chi2.ppf(0.975, 2 * k + 2)) / 2.0 / h
+    def nominal(self) -> Frequency:
+        """False interventions in nominal operation."""
+        return per_hour(self.nominal_opened, self.nominal_h)
 
 
 def drawn(ranges: Mapping[str, tuple[float, float]], seed: int) -> dict[str, float]:

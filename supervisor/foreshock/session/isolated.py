@@ -24,6 +24,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from foreshock._strict import convert
 from foreshock.errors import ForeshockError, TwinError
+from foreshock.records import Intervention
 from foreshock.registry import Registry
 from foreshock.session.run import Arm, Run
 from foreshock.session.scenario import Scenario
@@ -35,12 +36,13 @@ __all__ = ["Failure", "Job", "build_twin", "run_all", "run_one"]
 
 
 class Job(msgspec.Struct, frozen=True):
-    """One run to do."""
+    """One run to do; scripted interventions are decided by nobody."""
 
     scenario: Scenario
     arm: Arm
     seed: int
     detail: bool = True
+    scripted: tuple[Intervention, ...] = ()
 
 
 class Failure(msgspec.Struct, frozen=True):
@@ -84,7 +86,8 @@ def _work(job: Job, scratch: str) -> Run:
         gc.freeze()  # a full collection would walk through all that set-up made, in the middle of a tick
         judge = _BENCH[key]
     try:
-        return simulate(job.scenario, _BENCH[twin_key], judge, job.arm, job.seed, detail=job.detail)
+        twin = _BENCH[twin_key]
+        return simulate(job.scenario, twin, judge, job.arm, job.seed, detail=job.detail, scripted=job.scripted)
     except TwinError:
         _BENCH.pop(twin_key).close()
         raise

@@ -17,7 +17,7 @@ from foreshock.errors import ConfigError, ForeshockError, nearest
 from foreshock.registry import Broken, Registry
 from foreshock.taxonomy import builtin_taxonomy
 
-__all__ = ["Distribution", "Scenario", "broken_scenarios", "find_scenario", "load_scenario", "scenario_ids"]
+__all__ = ["Distribution", "Scenario", "Severity", "broken_scenarios", "find_scenario", "load_scenario", "scenario_ids"]
 
 
 class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -55,6 +55,13 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return float(rng.choice(self.choice or (0.0,)))
 
 
+class Severity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How severe the cause is: the parameter that says so, and values from what needs no action to what none saves."""
+
+    parameter: str
+    values: tuple[float, ...]
+
+
 def _stream(seed: int, name: str) -> np.random.Generator:
     return np.random.default_rng([0x73, seed, zlib.crc32(name.encode())])
 
@@ -72,6 +79,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         config: the supervisor's configuration, inline.
         parameters: values of the twin's parameters, where they differ from its defaults; finite.
         distributions: parameters that each seed draws anew.
+        severity: the parameter to sweep, and its values; None if none was chosen.
         folder: where the file lies; relative paths start there.
     """
 
@@ -84,6 +92,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     config: dict[str, Any]
     parameters: dict[str, float] = {}
     distributions: dict[str, Distribution] = {}
+    severity: Severity | None = None
     folder: str = ""
 
     def __post_init__(self) -> None:

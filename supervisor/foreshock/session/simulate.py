@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 
 from foreshock.clock import NS_PER_S, ns, seconds
@@ -28,6 +29,7 @@ def simulate(
     seed: int,
     *,
     detail: bool = True,
+    scripted: Sequence[Intervention] = (),
     journals: Sequence[Journal] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Run:
@@ -40,6 +42,8 @@ def simulate(
         arm: on (judges and acts), shadow (judges), off.
         seed: of all randomness in the twin and the detectors.
         detail: keep timeline, series and digest.
+        scripted: interventions that nobody decides: each holds from its stamp on. For comparison with those that are
+            decided; only without a supervisor that acts.
         journals: further records of every tick.
         progress: told the simulated time in s now and then.
 
@@ -47,6 +51,9 @@ def simulate(
         TwinError: the twin failed.
         ConfigError: the periods of twin and supervisor do not fit.
     """
+    if scripted and arm == "on":
+        raise ConfigError(scenario.id, "scripted interventions would meet those of the supervisor", "; take arm off")
+    waiting = deque(sorted(scripted, key=lambda i: i.stamp_ns))
     judge = supervisor if arm != "off" else None
     if judge is None and arm != "off":
         raise ConfigError(scenario.id, f"arm {arm!r} needs a supervisor")
@@ -69,6 +76,10 @@ def simulate(
     ignored: set[str] = set()
     while now < end and (stop is None or now < stop):
         now += period
+        while waiting and waiting[0].stamp_ns < now:
+            change = waiting.popleft()
+            if change.action in twin.actions:
+                twin.intervene(change)
         samples = twin.advance(now)
         events = twin.events()
         decision = None

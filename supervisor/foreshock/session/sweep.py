@@ -11,10 +11,11 @@ import msgspec
 
 from foreshock.records import ProtectionLevel
 from foreshock.session.isolated import Failure, Job, run_all
+from foreshock.session.rates import Rate, wilson
 from foreshock.session.run import Arm, Run
 from foreshock.session.scenario import Scenario
 
-__all__ = ["ArmSpec", "Cell", "CellResult", "Rate", "sweep", "wilson"]
+__all__ = ["ArmSpec", "Cell", "CellResult", "sweep"]
 
 
 class ArmSpec(msgspec.Struct, frozen=True):
@@ -32,18 +33,6 @@ class Cell(msgspec.Struct, frozen=True):
     label: str
     parameters: dict[str, float]
     seeds: tuple[int, ...]
-
-
-class Rate(msgspec.Struct, frozen=True):
-    """The rate k/n, with the 95% Wilson interval."""
-
-    k: int
-    n: int
-    low: float
-    high: float
-
-    def __str__(self) -> str:
-        return f"{self.k}/{self.n} ({100 * self.low:.0f}–{100 * self.high:.0f}%)" if self.n else "–"
 
 
 class CellResult(msgspec.Struct, frozen=True):
@@ -70,16 +59,6 @@ class CellResult(msgspec.Struct, frozen=True):
     false_interventions: Rate
     lead_s: tuple[float, ...]
     failures: int
-
-
-def wilson(k: int, n: int) -> Rate:
-    """The rate k/n with its 95% Wilson score interval (scipy.stats.binomtest)."""
-    if n == 0:
-        return Rate(0, 0, 0.0, 1.0)
-    from scipy.stats import binomtest
-
-    interval = binomtest(k, n).proportion_ci(0.95, "wilson")
-    return Rate(k, n, float(interval.low), float(interval.high))
 
 
 def sweep(
