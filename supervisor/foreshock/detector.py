@@ -70,7 +70,7 @@ class DetectorSpec(msgspec.Struct, frozen=True):
 
     Attributes:
         id: kebab-case name, unique among the loaded detectors.
-        kinds: taxonomy ids that it reports on.
+        kinds: taxonomy ids that it can report on.
         inputs: channels that it reads, or a function of its configuration that gives them.
         build: makes the detector from its configuration; imports heavy packages here, not at module level.
         config: frozen Struct of its settings, with defaults, forbid_unknown_fields.
@@ -80,6 +80,7 @@ class DetectorSpec(msgspec.Struct, frozen=True):
         isolation: ``process`` runs it in a child process, where it can hang or crash without harm.
         extra: the extra of foreshock (or the distribution) that its heavy packages come with.
         summary: one line for ``foreshock detectors list``.
+        reports: gives those of kinds that it reports under a configuration; None is all of them, under any.
     """
 
     id: str
@@ -93,3 +94,4 @@ class DetectorSpec(msgspec.Struct, frozen=True):
     isolation: Isolation = "in-process"
     extra: str = ""
     summary: str = ""
+    reports: Callable[[Any], tuple[str, ...]] | None = None

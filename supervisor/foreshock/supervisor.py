@@ -197,6 +197,23 @@ def inputs_of(spec: DetectorSpec, config: object) -> tuple[Input, ...]:
     return spec.inputs(config) if callable(spec.inputs) else spec.inputs
 
 
+def kinds_of(spec: DetectorSpec, config: object, place: str) -> tuple[str, ...]:
+    """The kinds that a detector reports with this configuration.
+
+    Raises:
+        PluginError: its function gives none, or one that the spec does not declare.
+    """
+    if spec.reports is None:
+        return spec.kinds
+    kinds = spec.reports(config)
+    if not kinds:
+        raise PluginError(place, f"detector {spec.id!r} reports nothing with this configuration")
+    for kind in kinds:
+        if kind not in spec.kinds:
+            raise PluginError(place, f"detector {spec.id!r} does not declare {kind!r}", nearest(kind, spec.kinds))
+    return kinds
+
+
 def build_detector(spec: DetectorSpec, config: object, place: str) -> Detector:
     """A detector in this process.
 
@@ -232,6 +249,7 @@ def contain(spec: DetectorSpec, entry: DetectorEntry, place: str, robot: str, ta
         else msgspec.structs.replace(i, channel=f"{robot}/{entry.channels.get(i.name, i.channel)}")
         for i in inputs
     ]
+    told = msgspec.structs.replace(spec, kinds=kinds_of(spec, settings, place))
     if (entry.isolation or spec.isolation) == "process":
-        return Contained(spec, ChildDetector(spec, settings, place), bound, taxonomy)
-    return Contained(spec, build_detector(spec, settings, place), bound, taxonomy)
+        return Contained(told, ChildDetector(spec, settings, place), bound, taxonomy)
+    return Contained(told, build_detector(spec, settings, place), bound, taxonomy)

@@ -25,7 +25,7 @@ from foreshock.clock import ns
 from foreshock.detector import DetectorSpec, Input
 from foreshock.messages import is_finite
 from foreshock.records import Decision, Sample
-from foreshock.supervisor import build_detector
+from foreshock.supervisor import build_detector, kinds_of
 from foreshock.taxonomy import PrecursorKind, builtin_taxonomy
 from foreshock.testing._purity import Purity
 from foreshock.testing.faults import disordered, duplicated, silenced, spoiled
@@ -220,7 +220,7 @@ class DetectorConformance:
     def _ids(self) -> Mapping[str, str]:
         """Declared name of a kind -> its id."""
         taxonomy = builtin_taxonomy().extended(self.precursors)
-        return {name: taxonomy.kind(name).id for name in self.spec.kinds}
+        return {name: taxonomy.kind(name).id for name in kinds_of(self.spec, self._rig.settings, self.spec.id)}
 
     @property
     def _kinds(self) -> frozenset[str]:
