@@ -52,7 +52,9 @@ class VisionDetector:
         self._lowness = Hysteresis(low, high, self._hold_ns)
         self._collapse = Hysteresis(1.0, 0.5, self._hold_ns)
         self._least_confidence, self._fall, self._fall_limit = 1.0, 0.0, config.collapse_drop
-        self._known: dict[tuple[str, str], tuple[int, int]] = {}
+        self._spoken: list[tuple[str, str]] = []
+        self._since: dict[tuple[str, str], int] = {}
+        self._gone: dict[tuple[str, str], int] = {}
 
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:  # noqa: ARG002  # time is the samples' own
         """One indication per kind and track, or per kind for those about the whole view."""
@@ -97,17 +99,18 @@ class VisionDetector:
 
     def _depart(self, said: list[Indication], ref: SampleRef) -> None:
         """Report what is no longer spoken of as absent, for as long as it had been reported; note who is spoken of."""
-        known, stamp = self._known, ref.stamp_ns
-        for i in said:
-            key = (i.kind, i.subject)
-            entry = known.get(key)
-            known[key] = (stamp if entry is None else entry[0], stamp)
-        for key, (first_ns, last_ns) in tuple(known.items()):
-            if last_ns == stamp:
-                continue
-            kind, subject = key
-            if stamp - last_ns > last_ns - first_ns:
-                del known[key]
+        stamp, spoken, gone = ref.stamp_ns, [(i.kind, i.subject) for i in said], self._gone
+        if spoken != self._spoken:
+            now, before, since = set(spoken), set(self._spoken), self._since
+            for key in sorted(before - now):
+                gone[key] = 2 * stamp - since.pop(key)
+            for key in sorted(now - before):
+                since[key] = stamp
+                gone.pop(key, None)
+            self._spoken = spoken
+        for (kind, subject), until_ns in tuple(gone.items()) if gone else ():
+            if stamp > until_ns:
+                del gone[kind, subject]
             else:
                 said.append(Indication(kind, subject, stamp, False, 0.0, 1.0, "1", 0.0, (ref,), None, {"gone": 1.0}))
 

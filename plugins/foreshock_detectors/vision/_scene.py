@@ -93,8 +93,10 @@ class Scene:
             if t.class_id in config.covering and t.seen_ns == stamp_ns and t.visible >= config.visible_least
         ]
         for track in self.tracks:
-            track.covered = track.class_id not in config.covering and any(
-                math.dist(hand.at, track.at) <= config.cover_m for hand in hands if hand is not track
+            track.covered = (
+                bool(hands)
+                and track.class_id not in config.covering
+                and any(math.dist(hand.at, track.at) <= config.cover_m for hand in hands if hand is not track)
             )
 
     def visible(self, track: Track) -> float:
