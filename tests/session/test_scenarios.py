@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -186,3 +187,51 @@ def test_a_duration_is_accepted_only_if_time_can_pass_and_end(duration_s):
         assert not fits
     else:
         assert fits
+
+
+DRAWN = """
+[distributions.push]
+uniform = [1.0, 3.0]
+[distributions.mass]
+normal = [2.0, 0.5]
+[distributions.foot]
+choice = [0.0, 1.0]
+"""
+
+
+def test_each_seed_draws_its_parameters_and_a_fixed_value_takes_their_place(tmp_path):
+    path = written(tmp_path / "drawn.toml")
+    path.write_text(path.read_text() + DRAWN)
+    scenario = load_scenario(path)
+    draws = [scenario.drawn(seed) for seed in range(2000)]
+    assert scenario.drawn(3) == draws[3] != draws[4]
+    push, mass, foot = (np.array([d[n] for d in draws]) for n in ("push", "mass", "foot"))
+    # mean within four standard errors, of a uniform, a normal and a fair coin
+    assert push.mean() == pytest.approx(2.0, abs=4 * 2.0 / math.sqrt(12 * 2000))
+    assert (push.min() >= 1.0, push.max() < 3.0) == (True, True)
+    assert mass.mean() == pytest.approx(2.0, abs=4 * 0.5 / math.sqrt(2000))
+    assert np.abs(mass - 2.0).max() <= 1.5
+    assert set(foot) == {0.0, 1.0}
+    assert abs(np.corrcoef(push, mass)[0, 1]) < 4 / math.sqrt(2000)
+    fixed = scenario.with_({"push": 9.0})
+    assert all(fixed.drawn(s) == {**scenario.drawn(s), "push": 9.0} for s in range(20))
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("drop_mu = { uniform = [0.0, 1.0] }", "has a fixed value under parameters as well"),
+        ("x = { uniform = [2.0, 1.0] }", "low 2.0 is above high 1.0"),
+        ("x = { normal = [2.0, -1.0] }", "standard deviation -1.0"),
+        ("x = { normal = [2.0, 1.0], choice = [1.0] }", "2 of uniform, normal and choice"),
+        ("x = {}", "0 of uniform, normal and choice"),
+        ("x = { choice = [nan] }", "not finite"),
+        ("x = { unifrom = [0.0, 1.0] }", "did you mean 'uniform'"),
+    ],
+)
+def test_a_wrong_distribution_is_refused(tmp_path, table, said):
+    path = written(tmp_path / "wrong.toml")
+    path.write_text(path.read_text() + f"[distributions]\n{table}\n")
+    with pytest.raises(ConfigError) as caught:
+        load_scenario(path)
+    assert said in str(caught.value)

@@ -53,7 +53,6 @@ def test_the_same_actions_come_at_another_time_of_the_same_length() -> None:
         on, off = _moved(run, scenario, seed)
         assert off.stamp_ns - on.stamp_ns == 3 * SECOND
         starts.append(on.stamp_ns / 1e9)
-    span_s = scenario.duration_s
     # uniform over the scenario: mean within four standard errors of the middle
     assert sum(starts) / 200 == pytest.approx(
         scenario.duration_s / 2, abs=4 * scenario.duration_s / math.sqrt(12 * 200)

@@ -18,6 +18,7 @@ from foreshock.cli.detectors_cmd import detectors
 from foreshock.cli.events_cmd import events
 from foreshock.cli.gates_cmd import gates
 from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, TERMINATED, emit, notes
+from foreshock.cli.policies_cmd import policies
 from foreshock.cli.scenarios_cmd import scenarios
 from foreshock.cli.sensitivity_cmd import sensitivity
 from foreshock.cli.simulate_cmd import simulate
@@ -65,7 +66,19 @@ def cli() -> None:
     """
 
 
-for command in (calibrate, config, demo, detectors, events, gates, scenarios, sensitivity, simulate, taxonomy):
+for command in (
+    calibrate,
+    config,
+    demo,
+    detectors,
+    events,
+    gates,
+    policies,
+    scenarios,
+    sensitivity,
+    simulate,
+    taxonomy,
+):
     cli.add_command(command)
 
 
