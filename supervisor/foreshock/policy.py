@@ -26,6 +26,7 @@ class ActionSpec(msgspec.Struct, frozen=True):
         duration_s: how long it takes until it helps; of a mitigation, how long before the accident it must begin.
         may_worsen: precursor kinds in whose presence it may make things worse.
         mitigates: it softens the accident instead of preventing it.
+        resumes: motion begins again when it is released, which is announced: an abrupt restart is itself a precursor.
         source: where it comes from.
     """
 
@@ -35,6 +36,7 @@ class ActionSpec(msgspec.Struct, frozen=True):
     duration_s: float
     may_worsen: tuple[str, ...] = ()
     mitigates: bool = False
+    resumes: bool = False
     source: str = ""
 
 
@@ -43,7 +45,8 @@ ACTIONS: Mapping[str, ActionSpec] = {
     a.id: a
     for a in (
         ActionSpec("speed-scale", "scale speed and force down", ("speed",), 0.0, source="ISO 10218-1 reduced speed"),
-        ActionSpec("step-suppression", "halt the next planned step", ("steps",), 0.15, source=PAPER),
+        ActionSpec("announce", "light and sound", ("signal",), 0.0, source="ISO 12100, 6.4.3; ISO 7731"),
+        ActionSpec("step-suppression", "halt the next planned step", ("steps",), 0.15, resumes=True, source=PAPER),
         ActionSpec("arm-reconfiguration", "extend the arms for counter-torque", ("arms",), 0.3, source=PAPER),
         ActionSpec(
             "compliance-tuning",
@@ -54,7 +57,14 @@ ACTIONS: Mapping[str, ActionSpec] = {
             source=PAPER,
         ),
         ActionSpec("balance-lock", "power-assisted balance lock", ("balance",), 0.05, source=PAPER),
-        ActionSpec("minimal-risk", "go to the minimal risk condition", ("motion",), 0.2, source="ISO 22737, ISO 34501"),
+        ActionSpec(
+            "minimal-risk",
+            "go to the minimal risk condition",
+            ("motion",),
+            0.2,
+            resumes=True,
+            source="ISO 22737, ISO 34501",
+        ),
         ActionSpec(
             "impact-mitigation",
             "soften the impact, away from the human",
@@ -142,6 +152,7 @@ class ArbiterState(msgspec.Struct, frozen=True):
     settled: tuple[frozenset[Proposal], frozenset[str]] | None = None
 
 
+ANNOUNCE = "announce"
 UNCONDITIONAL = frozenset({"speed-scale", "minimal-risk"})
 MITIGATION_NS = 500_000_000
 """A mitigation that has begun holds for so long: as long as the last part of a fall takes."""
@@ -246,7 +257,11 @@ class Arbiter:
         active: dict[str, Intervention] = {}
         engaged: dict[str, int] = {}
         changes: list[Intervention] = []
-        for p in self.choose(feasible, present):
+        chosen = self.choose(feasible, present)
+        if resumed := self._resumed(state, chosen):
+            why = f"motion resumes: {', '.join(resumed)} is released"
+            chosen.append(Proposal(ANNOUNCE, 1.0, ProtectionLevel.NORMAL, "", why))
+        for p in chosen:
             held = state.active.get(p.action)
             if held is None or p.action in state.releasing or self._moved(held.strength, p.strength):
                 seen = [f"{e.kind}@{e.subject}" if e.subject else e.kind for e in situation.precursors]
@@ -276,9 +291,18 @@ class Arbiter:
             active[action] = held
             engaged[action] = state.engaged_ns.get(action, now)
         held_now = tuple(active[a] for a in sorted(active))
-        timed = timed or bool(releasing) or any(self.actions[a].mitigates for a in active)
+        timed = timed or bool(releasing) or bool(resumed) or any(self.actions[a].mitigates for a in active)
         after = ArbiterState(active, engaged, releasing, held_now, None if timed else (asked, present))
         return after, held_now, tuple(sorted(changes, key=lambda i: i.action))
+
+    def _resumed(self, state: ArbiterState, chosen: Sequence[Proposal]) -> list[str]:
+        """Actions that end now, so that motion begins again, and that nobody has announced."""
+        wanted = {p.action for p in chosen}
+        if wanted.issuperset(state.active) or ANNOUNCE in wanted or ANNOUNCE not in self.actions:
+            return []
+        taken = {r for a in wanted for r in self.actions[a].resources}
+        going = [self.actions[a] for a in sorted(state.active.keys() - wanted)]
+        return [a.id for a in going if a.resumes and taken.isdisjoint(a.resources)]
 
     def _moved(self, old: float, new: float) -> bool:
         return new > old or old - new >= self._step or (new != old and new == 0.0)

@@ -10,7 +10,6 @@ BALANCE = ("foot-micro-slip", "torso-angular-spike", "com-lateral-deviation", "s
 """A robot that freezes in these may topple: rule 6."""
 
 MODE_ACTIONS: tuple[ActionSpec, ...] = (
-    ActionSpec("announce", "light and sound", ("signal",), 0.0, source="ISO 12100, 6.4.3; ISO 7731"),
     ActionSpec("slow-approach", "less speed towards people", ("approach-speed",), 0.2, source="ISO/TS 15066, 5.5.4"),
     ActionSpec(
         "hold",
@@ -18,6 +17,7 @@ MODE_ACTIONS: tuple[ActionSpec, ...] = (
         ("motion",),
         0.3,
         may_worsen=BALANCE,
+        resumes=True,
         source="ISO 10218-1, safety-rated monitored stop; IEC 60204-1 category 2",
     ),
     ActionSpec(
@@ -26,9 +26,10 @@ MODE_ACTIONS: tuple[ActionSpec, ...] = (
         ("motion",),
         0.3,
         may_worsen=BALANCE,
+        resumes=True,
         source="ISO 10218-1, protective stop; IEC 60204-1 category 1",
     ),
-    ActionSpec("retreat", "move away from the human", ("motion",), 0.6, may_worsen=BALANCE, source="ISO 13482, 5.10"),
+    ActionSpec("retreat", "move away from people", ("motion",), 0.6, BALANCE, resumes=True, source="ISO 13482, 5.10"),
     ActionSpec("replan", "take another path", ("path",), 0.4, source="ISO 13482, 5.10"),
     ActionSpec("shorten-step", "shorter, lower steps", ("steps",), 0.2, source="ISO 13482, 5.9"),
     ActionSpec("withdraw-arm", "arm back to the body", ("arms",), 0.3, source="ISO/TS 15066, 5.5.4"),

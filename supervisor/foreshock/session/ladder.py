@@ -33,7 +33,7 @@ PHASES: Mapping[str, tuple[float, float]] = {
     "onset": (2.6, math.inf),
     "ongoing": (0.8, math.inf),
 }
-"""From better to worse: when the kind is present, in s. Ongoing lasts longer than the window, and counts more than once."""
+"""From better to worse: when the kind is present, in s. Ongoing lasts longer than the window, and counts twice."""
 TIMES_S = (math.inf, 2.0, 1.0, 0.5, 0.2)
 """Predicted times to the accident, from better to worse; inf: none is predicted."""
 TICK_S, END_S, LOST_S, MAX_AGE_S = 0.2, 3.2, 2.8, 0.3
