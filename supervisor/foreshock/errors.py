@@ -12,6 +12,7 @@ __all__ = [
     "MissingExtraError",
     "PluginError",
     "TwinError",
+    "WireError",
     "nearest",
 ]
 
@@ -58,6 +59,10 @@ class PluginError(BadInputError):
 
 class MissingExtraError(BadInputError):
     """A plugin needs a package that is not installed; the hint is the command that installs it."""
+
+
+class WireError(BadInputError):
+    """A payload, an attachment or a key that came over the wire is not what its type or key says."""
 
 
 class TwinError(ForeshockError):

@@ -1,0 +1,29 @@
+"""The wire format: CDR of ROS 2 messages, attachments and key expressions (docs/wire.md). Needs no Zenoh."""
+
+from foreshock.wire._attachment import Attachment, pack_attachment, unpack_attachment
+from foreshock.wire._codec import MAX_BYTES, Codec, decode_reference, decode_ros, encode_reference, encode_ros
+from foreshock.wire._keys import Keys, Naming, dds_name, liveliness_token
+from foreshock.wire._ros import BY_ROS, ROS_NAMES
+from foreshock.wire._types import definitions, rihs01, ros_type, typestore
+
+__all__ = [
+    "BY_ROS",
+    "MAX_BYTES",
+    "ROS_NAMES",
+    "Attachment",
+    "Codec",
+    "Keys",
+    "Naming",
+    "dds_name",
+    "decode_reference",
+    "decode_ros",
+    "definitions",
+    "encode_reference",
+    "encode_ros",
+    "liveliness_token",
+    "pack_attachment",
+    "rihs01",
+    "ros_type",
+    "typestore",
+    "unpack_attachment",
+]
