@@ -24,13 +24,14 @@ void gaze_tick(Plant *self, const double *vars, double t) {
     }
 }
 
-/* Called, he looks at the robot whatever he was at; the process underneath goes on, so that no draw depends on it. */
+/* Called, he looks at the robot whatever he was at, and a little longer; the process underneath goes on, so that no draw depends on it. */
 void attention_step(Plant *self, const double *vars, double t) {
     const double h = vars[V_dt];
     Plan plan = plan_at(self, vars, t);
     const int called = vars[V_announce] > 0.5 || plan.announced > 0.5;
     self->called_for = called ? self->called_for + h : 0.0;
-    const int looks = self->looks || self->called_for > vars[V_announce_latency];
+    if (self->called_for > vars[V_announce_latency]) self->watch_until = t + vars[V_watch_after];
+    const int looks = self->looks || t < self->watch_until;
     const double aim = looks ? 0.0 : vars[V_work_angle];
     self->yaw += (aim - self->yaw) * h / vars[V_head_lag];
     const int sees = fabs(self->yaw) < 0.5;

@@ -20,7 +20,7 @@ struct Plant {
     double act_slow, act_hold;
     /* gaze and attention */
     int looks, works;
-    double dwell_end, yaw, attention, called_for, wander, threshold_noise;
+    double dwell_end, yaw, attention, called_for, watch_until, wander, threshold_noise;
     /* startle */
     double stimulus, threshold, fired_at, peak, strength, startle_max, acceleration;
     /* balance */
