@@ -17,8 +17,10 @@ from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
 from foreshock.cli.events_cmd import events
 from foreshock.cli.gates_cmd import gates
+from foreshock.cli.journal_cmd import journal
 from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, TERMINATED, emit, notes
 from foreshock.cli.policies_cmd import policies
+from foreshock.cli.replay_cmd import replay
 from foreshock.cli.scenarios_cmd import scenarios
 from foreshock.cli.sensitivity_cmd import sensitivity
 from foreshock.cli.simulate_cmd import simulate
@@ -66,19 +68,11 @@ def cli() -> None:
     """
 
 
-for command in (
-    calibrate,
-    config,
-    demo,
-    detectors,
-    events,
-    gates,
-    policies,
-    scenarios,
-    sensitivity,
-    simulate,
+COMMANDS = (
+    calibrate, config, demo, detectors, events, gates, journal, policies, replay, scenarios, sensitivity, simulate,
     taxonomy,
-):
+)  # fmt: skip
+for command in COMMANDS:
     cli.add_command(command)
 
 

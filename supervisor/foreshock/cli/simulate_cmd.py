@@ -57,6 +57,7 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
     help="Wall-clock limit in s; 60 s and ten times the duration by default.",
 )
 @click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="Write an HTML report here.")
+@click.option("--journal", type=click.Path(path_type=Path, dir_okay=False), help="Record the run in this MCAP file.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def simulate(
     scenario: str,
@@ -68,6 +69,7 @@ def simulate(
     duration: float | None,
     timeout: float | None,
     report: Path | None,
+    journal: Path | None,
     as_json: bool,
 ) -> int:
     """Run a scenario (an id, or a TOML file) and say what happened.
@@ -81,9 +83,12 @@ def simulate(
         found = msgspec.structs.replace(found, twin={"kind": twin})
     if duration is not None:
         found = msgspec.structs.replace(found, duration_s=duration)
+    if journal is not None and arm == "off":
+        raise BadInputError("--journal", "nothing decides with --supervisor off", "; take shadow")
+    job = Job(found, arm, seed, journal="" if journal is None else str(journal.resolve()))
     with Progress(console=notes, transient=True, disable=as_json) as progress:
         progress.add_task(f"{found.id} ({found.duration_s:g} s)", total=None)
-        run = run_one(Job(found, arm, seed), timeout)
+        run = run_one(job, timeout)
     if report is not None:
         try:
             from foreshock.report import write_report
@@ -96,8 +101,9 @@ def simulate(
     warn(run.warnings)
     timeline(run)
     console.print(summary(run), soft_wrap=True)
-    if report is not None:
-        console.print(f"report: {report}")
+    for what, path in (("report", report), ("journal", journal)):
+        if path is not None:
+            console.print(f"{what}: {path}", markup=False)
     return OK
 
 

@@ -24,6 +24,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from foreshock._strict import convert
 from foreshock.errors import ForeshockError, TwinError
+from foreshock.journal import Journal
 from foreshock.records import Intervention
 from foreshock.registry import Registry
 from foreshock.session.run import Arm, Run
@@ -36,13 +37,14 @@ __all__ = ["Failure", "Job", "build_twin", "run_all", "run_one"]
 
 
 class Job(msgspec.Struct, frozen=True):
-    """One run to do; scripted interventions are decided by nobody."""
+    """One run to do; scripted interventions are decided by nobody; journal is the file to record it in, or empty."""
 
     scenario: Scenario
     arm: Arm
     seed: int
     detail: bool = True
     scripted: tuple[Intervention, ...] = ()
+    journal: str = ""
 
 
 class Failure(msgspec.Struct, frozen=True):
@@ -87,10 +89,38 @@ def _work(job: Job, scratch: str) -> Run:
         judge = _BENCH[key]
     try:
         twin = _BENCH[twin_key]
-        return simulate(job.scenario, twin, judge, job.arm, job.seed, detail=job.detail, scripted=job.scripted)
+        with closing_all(_journals(job)) as journals:
+            return simulate(
+                job.scenario,
+                twin,
+                judge,
+                job.arm,
+                job.seed,
+                detail=job.detail,
+                scripted=job.scripted,
+                journals=journals,
+            )
     except TwinError:
         _BENCH.pop(twin_key).close()
         raise
+
+
+def _journals(job: Job) -> list[Journal]:
+    if not job.journal:
+        return []
+    from foreshock.recording import Head, McapJournal
+
+    return [McapJournal(Path(job.journal), Head(job.scenario.config, job.scenario.folder, job.seed, 0))]
+
+
+@contextmanager
+def closing_all(journals: list[Journal]) -> Iterator[list[Journal]]:
+    """Closes them, however the run ends: what was recorded must be readable."""
+    try:
+        yield journals
+    finally:
+        for journal in journals:
+            journal.close()
 
 
 def _die_with(parent: int) -> None:
