@@ -29,6 +29,6 @@ PROTOCOLS: Mapping[str, Protocol] = {
     "A8": Protocol(("slow-approach",), ("hold", "announce")),
     "A9": Protocol(("derate",), ("protective-stop", "brake-joints")),
     "A10": Protocol(("hold",), ("tool-off", "reorient-tool", "hold")),
-    "A11": Protocol(("slow-approach",), ("lower-load", "hold")),
+    "A11": Protocol(("slow-approach", "regrasp"), ("regrasp", "hold", "lower-load")),
     "A12": Protocol(("announce",), ("protective-stop", "announce")),
 }
