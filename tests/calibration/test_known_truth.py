@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from foreshock.calibration import compare, correlation, features, fit, landmarks
+from foreshock.calibration import Moments, compare, correlation, features, fit, landmarks
 from foreshock.events.schema import Event, EventPrecursor
 
 KINDS = ("foot-micro-slip", "torso-angular-spike", "sway-amplitude-increase", "grip-micro-slip", "visual-occlusion")
@@ -107,9 +107,9 @@ def test_r_is_found_where_a_common_cause_is_and_nowhere_else() -> None:
 
 @pytest.mark.parametrize("common_cause", [True, False])
 def test_the_correlated_model_predicts_better_where_there_is_a_common_cause(common_cause: bool) -> None:
-    moments = landmarks(drawn(2500, 7, common_cause), 1.5, H, at="last-onset")
     r = {p.kinds: p.r for p in correlation(nominal(8, common_cause))}
-    scores = {s.model: s for s in compare(moments, r, lambda _: {}, seed=9)[0]}
+    moments = Moments(drawn(2500, 7, common_cause), H, "", r, at="last-onset")
+    scores = {s.model: s for s in compare(moments, lambda _: {}, seed=9, windows=[1.5])[0]}
     correlated = scores["correlated LE, fitted"]
     if common_cause:
         assert correlated.high < 0.0  # better than the independent LE, interval included

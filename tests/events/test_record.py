@@ -2,52 +2,40 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 import pytest
 
+from foreshock import evidence as ev
 from foreshock.errors import BadInputError
 from foreshock.events import EventPrecursor, read_events, write_events
+from foreshock.events._stretches import Stretches
 from foreshock.events.record import episode, jobs, record
-from foreshock.evidence import Window
+from foreshock.records import Decision, Indication, Precursor, ProtectionLevel, RiskEstimate, Trust
 from foreshock.session.isolated import Failure
-from foreshock.session.run import Run, TimelineRow
+from foreshock.session.run import Run
 from foreshock.session.scenario import Scenario, load_scenario
 from foreshock.taxonomy import builtin_taxonomy
 from foreshock.twin import TwinEvent
 
 ROGUE = Path(__file__).parents[1] / "rogues" / "fmus" / "rogue"
-LEFT, RIGHT = "foot-micro-slip@left", "foot-micro-slip@right"
-
-
-def row(t_s: float, *precursors: str) -> TimelineRow:
-    return TimelineRow(t_s, precursors, *[math.nan] * 5, "normal")
-
-
-ROWS = (
-    row(0.005),
-    row(2.0, f"+{LEFT}"),
-    row(2.5, LEFT, "+torso-angular-spike"),
-    row(4.25, "torso-angular-spike"),  # left foot: last present 1.5 s ago
-    row(4.75, "torso-angular-spike", f"+{RIGHT}"),
-    row(5.0, RIGHT, "torso-angular-spike", f"+{LEFT}"),
-    row(6.5, RIGHT, LEFT, "+com-lateral-deviation"),
-)
+SLIP, TORSO, COM = "foot-micro-slip", "torso-angular-spike", "com-lateral-deviation"
 FALL = TwinEvent(5_000_000_000, "balance-lost", "", 1.0, 0.5, "1")
 STRIKE = TwinEvent(6_000_000_000, "fall-onto-human", "A1", 700.0, 280.0, "N")
-RUN = Run("a1", "A1", "shadow", "ladder", 7, {"drop_mu": 0.04}, True, STRIKE.id, (FALL, STRIKE), 6.5, timeline=ROWS)
+RUN = Run("a1", "A1", "shadow", "ladder", 7, {"drop_mu": 0.04}, True, STRIKE.id, (FALL, STRIKE), 6.5)
+SEEN = (
+    EventPrecursor(SLIP, 2.0, 2.75, 0.4, "left"),
+    EventPrecursor(TORSO, 2.5, 5.0),
+    EventPrecursor(SLIP, 5.0, None, 0.9, "left"),
+    EventPrecursor(COM, 6.5),
+)
 
 
-def test_onsets_and_ends_follow_from_the_window() -> None:
-    got = episode(RUN, platform="talos")
-    assert got.precursors == (
-        EventPrecursor("foot-micro-slip", 2.0, 2.75, 1.0, "left"),
-        EventPrecursor("torso-angular-spike", 2.5, 5.0),
-        EventPrecursor("foot-micro-slip", 4.75, None, 1.0, "right"),
-        EventPrecursor("foot-micro-slip", 5.0, None, 1.0, "left"),
-    )  # what began after the accident announced nothing
+def test_an_event_holds_what_began_before_the_accident() -> None:
+    got = episode(RUN, SEEN, platform="talos")
+    assert got.precursors == SEEN[:3]  # what began after the accident announced nothing
     assert (got.id, got.group, got.source, got.coder) == ("a1-seed-7", "a1-seed-7", "simulated", "detectors")
     assert (got.outcome, got.outcome_s, got.observed_s) == ("A1", 6.0, 6.5)
     assert (got.platform, got.environment, got.deviation) == ("talos", "simulated (drop_mu=0.04)", ("kinematic",))
@@ -57,22 +45,60 @@ def test_onsets_and_ends_follow_from_the_window() -> None:
     )
 
 
-def test_another_window_gives_other_ends() -> None:
-    got = episode(RUN, window=Window(0.5))
-    assert got.precursors[0].end_s == pytest.approx(3.75)
-    assert episode(RUN, window=Window(0.1, kernel="exponential")).precursors[0].end_s == pytest.approx(3.75)
-
-
 def test_a_run_without_accident_is_a_near_miss() -> None:
-    got = episode(msgspec.structs.replace(RUN, accident=False, outcome="balance-lost", events=(FALL,)))
+    got = episode(msgspec.structs.replace(RUN, accident=False, outcome="balance-lost", events=(FALL,)), SEEN)
     assert (got.outcome, got.outcome_s, got.accident) == ("none", None, False)
-    assert got.precursors[-1] == EventPrecursor("com-lateral-deviation", 6.5)
+    assert got.precursors == SEEN
 
 
-@pytest.mark.parametrize("lacking", [{"supervisor": "off"}, {"timeline": ()}])
-def test_a_run_that_nobody_judged_says_nothing_of_precursors(lacking: dict) -> None:
+def test_a_run_that_nobody_judged_says_nothing_of_precursors() -> None:
     with pytest.raises(BadInputError, match=r"run a1, seed 7: .*run it in shadow"):
-        episode(msgspec.structs.replace(RUN, **lacking))
+        episode(msgspec.structs.replace(RUN, supervisor="off"), ())
+
+
+def decision(now_ns: int, precursors: Sequence[Precursor], said: Sequence[Indication]) -> Decision:
+    risk = RiskEstimate(0.0, 0.0, 0.0, 0.0, 0.0, {}, {}, {})
+    trust = Trust(1.0, 1.0, {}, {}, {}, {})
+    return Decision(
+        now_ns,
+        0,
+        tuple(precursors),
+        risk,
+        trust,
+        ProtectionLevel.NORMAL,
+        {},
+        (),
+        (),
+        (),
+        True,
+        indications=tuple(said),
+    )
+
+
+def test_every_stretch_is_kept_with_its_highest_severity() -> None:
+    """A slip that comes back within the window, seen by two detectors, and a torso that is outside of what is kept.
+
+    Ticks of 0.1 s through foreshock.evidence with its window of 1.5 s, so that the second slip finds the first there.
+    """
+    severities = {0.2: 0.3, 0.3: 0.7, 0.4: 0.5, 1.0: 0.2, 1.1: 0.9}
+    kept = Stretches(frozenset({SLIP}))
+    state = ev.Evidence()
+    for k in range(12):
+        t, now = round(0.1 * k, 1), k * 100_000_000
+        said = [
+            Indication(SLIP, "left", now, t in severities, 1.0, 1.0, "1", severities.get(t, 0.0)),
+            Indication(SLIP, "left", now, t == 0.3, 1.0, 1.0, "1", 0.1),
+            Indication(TORSO, "", now, True, 1.0, 1.0, "1"),
+        ]
+        heard = {(i.kind, i.subject, f"detector-{n}"): i for n, i in enumerate(said)}
+        state, precursors = ev.step(state, ev.Window(), now, heard)
+        kept.tick((), decision(now, precursors, said))
+    first, second = (0.2, 0.4, 0.7), (1.0, None, 0.9)
+    assert [(p.onset_s, p.end_s, p.severity) for p in kept.found(1.1)] == [first, second]
+    assert {(p.kind, p.subject) for p in kept.found(1.1)} == {(SLIP, "left")}
+    # what an accident at 1.05 s cut short: the rise at 1.1 s came after it
+    assert [(p.onset_s, p.end_s, p.severity) for p in kept.found(1.05)] == [first, (1.0, None, 0.2)]
+    assert [(p.onset_s, p.end_s, p.severity) for p in kept.found(0.3)] == [(0.2, None, 0.7)]
 
 
 @pytest.fixture

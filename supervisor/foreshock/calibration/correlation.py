@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from foreshock.errors import BadInputError
 from foreshock.risk import Pair
 
-__all__ = ["correlation"]
+__all__ = ["correlation", "scaled"]
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 0.05
@@ -54,6 +54,20 @@ def correlation(runs: Sequence[Mapping[str, Sequence[float]]], seed: int = 0, dr
             names = (kinds[moving[i]], kinds[moving[j]])
             pairs.append(Pair(names, r, min(r, float(low[i, j])), max(r, float(high[i, j]))))
     return tuple(pairs)
+
+
+def scaled(pairs: Sequence[Pair], rho: float, low: float, high: float) -> tuple[Pair, ...]:
+    """R = rho R0 off its diagonal; the interval of r spans that of rho times that of r0.
+
+    I + rho (R0 - I) has the eigenvalues 1 + rho (w - 1): positive semidefinite like R0 for rho in 0..1.
+
+    Args:
+        pairs: R0.
+        rho: its scale, in 0..1.
+        low: lower end of the interval of rho.
+        high: upper end.
+    """
+    return tuple(Pair(p.kinds, rho * p.r, low * p.low, high * p.high) for p in pairs)
 
 
 def _shrunk(table: Array) -> Array:

@@ -19,7 +19,16 @@ __all__ = ["Landmark", "Seen", "landmarks"]
 
 
 class Seen(msgspec.Struct, frozen=True):
-    """One (kind, subject) inside the window: occurrences as the evidence window counts them, severity, onsets in s."""
+    """One (kind, subject) inside the window.
+
+    Attributes:
+        kind: taxonomy id.
+        subject: what it is about.
+        occurrences: as the evidence window counts them.
+        severity: the largest; 1 while a stretch lasts: a table holds the largest of a stretch, which nobody knows
+            before it is over, and what rises towards the accident must not tell of it beforehand.
+        onsets_s: times of the onsets.
+    """
 
     kind: str
     subject: str
@@ -86,7 +95,8 @@ def _seen(event: Event, t: float, window_s: float) -> tuple[Seen, ...]:
     for p in event.precursors:
         last = min(event.end_of(p), t)
         if p.onset_s <= t and last > t - window_s:
-            by_pair.setdefault((p.kind, p.subject), []).append((p.onset_s, last, p.severity))
+            severity = p.severity if event.end_of(p) <= t else 1.0
+            by_pair.setdefault((p.kind, p.subject), []).append((p.onset_s, last, severity))
     found = []
     for (kind, subject), stretches in sorted(by_pair.items()):
         count = 0

@@ -22,7 +22,7 @@ from foreshock.session.scenario import find_scenario
 from foreshock.taxonomy import builtin_taxonomy
 
 if TYPE_CHECKING:
-    from foreshock.calibration import Score
+    from foreshock.calibration import Fitted, Score
 
 __all__ = ["calibrate"]
 
@@ -71,9 +71,7 @@ def nominal(scenario: tuple[str, ...], seeds: int, first_seed: int, out: Path, a
     "windows",
     type=click.FloatRange(0.0, min_open=True),
     multiple=True,
-    default=(1.5,),
-    show_default=True,
-    help="Window in s; of several, the one with the smallest log loss.",
+    help="Window in s: one fixes it, of several the likeliest is taken; by default it is fitted, 0.5 to 3 s.",
 )
 @click.option("--folds", type=click.IntRange(2), default=5, show_default=True, help="Of the cross-validation.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the bootstraps.")
@@ -94,10 +92,14 @@ def fit(
     report: Path | None,
     as_json: bool,
 ) -> int:
-    """Fit a, b, c, kappa and J to events, R to nominal runs, and compare the model with others, out of fold."""
+    """Fit the risk model to events and nominal runs, and compare it with others, out of fold.
+
+    a, b, c and kappa by maximum likelihood; window, the scale of R and presence by profile likelihood; J from the order
+    of precursors before accidents; R from nominal runs.
+    """
     try:
-        from foreshock.calibration import compare, correlation, features, landmarks, lifts, reliability
-        from foreshock.calibration import fit as fitted
+        from foreshock.calibration import Moments, compare, correlation, lifts, reliability, scaled
+        from foreshock.calibration import calibrate as calibrated
         from foreshock.calibration.nominal import read_nominal
     except ImportError as e:
         hint = "; run: pip install 'foreshock[analysis]'"
@@ -109,22 +111,17 @@ def fit(
         raise BadInputError("--out", f"{str(out)!r} is no .toml file")
     found, problems = _once_each(events, coder)
     pairs: tuple[Pair, ...] = correlation(read_nominal(nominal_file), seed) if nominal_file is not None else ()
-    r = {pair.kinds: pair.r for pair in pairs}
     links = lifts(found, seed)
-    j = {(k.first, k.then): k.lift for k in links}
-    tried = []
-    for window in windows:
-        moments = landmarks(found, window, horizon, mode)
-        best = fitted(features(moments, r, j))
-        # windows see other moments with evidence: the loss over all moments is what compares
-        tried.append((best.log_loss * best.n / max(len(moments), 1), window, moments, best))
-    _, window, moments, best = min(tried, key=lambda t: t[:2])
-    groups = {e.group: e for e in found}
+    moments = Moments(found, horizon, mode, {pair.kinds: pair.r for pair in pairs})
+    if len(moments.groups) < folds:
+        raise BadInputError("--folds", f"{folds} folds of {len(moments.groups)} groups")
+    best = calibrated(moments, {(k.first, k.then): k.lift for k in links}, windows)
+    intervals = best.fitted.intervals | {name: (p.low, p.high) for name, p in best.profiles.items()}
 
     def lifts_of(known: frozenset[str]) -> dict[tuple[str, str], float]:
-        return {(k.first, k.then): k.lift for k in lifts([groups[g] for g in sorted(known)], seed, draws=2)}
+        return {(k.first, k.then): k.lift for k in lifts([e for e in found if e.group in known], seed, draws=2)}
 
-    scores, predicted, y = compare(moments, r, lifts_of, folds, seed)
+    scores, predicted, y = compare(moments, lifts_of, folds, seed, windows)
     parameters = RiskParameters(
         name=out.stem,
         provenance=Provenance(
@@ -134,14 +131,16 @@ def fit(
             data=tuple(_digest(path) for path in (*events, *([nominal_file] if nominal_file else []))),
             synthetic=any(e.source == SYNTHETIC for e in found),
         ),
-        a=best.a,
-        b=best.b,
-        c=best.c,
-        kappa=best.kappa,
-        window_s=window,
+        a=best.fitted.a,
+        b=best.fitted.b,
+        c=best.fitted.c,
+        kappa=best.fitted.kappa,
+        presence=best.presence,
+        rho=best.rho,
+        window_s=best.window_s,
         horizon_s=horizon,
-        intervals=best.intervals,
-        correlation=pairs,
+        intervals=intervals,
+        correlation=scaled(pairs, best.rho, *intervals.get("rho", (best.rho, best.rho))),
         cascade=links,
     )
     save_parameters(out, parameters)
@@ -149,12 +148,28 @@ def fit(
     if report is not None:
         from foreshock.calibration.report import write_calibration_report
 
-        write_calibration_report(report, parameters, scores, bins, len(moments))
+        write_calibration_report(report, parameters, scores, bins, len(y), list(best.profiles.values()))
     if as_json:
-        emit({"parameters": parameters, "scores": scores, "reliability": bins, "moments": len(moments)})
+        profiles = list(best.profiles.values())
+        emit(
+            {
+                "parameters": parameters,
+                "profiles": profiles,
+                "scores": scores,
+                "reliability": bins,
+                "moments": len(y),
+                "with_evidence": best.fitted.n,
+            }
+        )
     else:
-        _print(parameters, scores, len(moments), best.events)
+        _print(parameters, scores, len(y), best.fitted)
         console.print(f"parameters: {out}" + (f"; report: {report}" if report else ""), markup=False)
+    for p in best.profiles.values():
+        if p.name == "window_s" and not windows and p.best in (p.curve[0][0], p.curve[-1][0]):
+            other = "longer" if p.best == p.curve[-1][0] else "shorter"
+            notes.print(
+                f"[yellow]window {p.best:g} s is at the end of what was tried: the events ask for a {other} one[/]"
+            )
     if problems:
         notes.print(f"[yellow]{problems} malformed rows were left out; see: foreshock events check[/]")
     return OK
@@ -179,7 +194,7 @@ def _digest(path: Path) -> str:
     return f"{path.name} sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}"
 
 
-def _print(p: RiskParameters, scores: list[Score], moments: int, accidents: int) -> None:
+def _print(p: RiskParameters, scores: list[Score], moments: int, fitted: Fitted) -> None:
     if p.provenance.synthetic:
         console.print("[bold red]SYNTHETIC: some or all of the events were never observed.[/]")
     values = msgspec.to_builtins(p)
@@ -189,13 +204,19 @@ def _print(p: RiskParameters, scores: list[Score], moments: int, accidents: int)
             f"{values[name]:.3f}",
             "{:.3f} to {:.3f}".format(*p.intervals[name]) if name in p.intervals else "not fitted",
         )
-        for name in ("a", "b", "c", "kappa")
+        for name in ("a", "b", "c", "kappa", "window_s", "rho", "presence")
     ]
-    what = f"P within {p.horizon_s:g} s, window {p.window_s:g} s; {moments} moments, {accidents} before an accident"
+    what = f"P within {p.horizon_s:g} s, window {p.window_s:g} s; {moments} moments, {fitted.n} of them with evidence"
+    what += f", {fitted.events} of these before an accident"
     console.print(what, markup=False)
     table("Fitted to all of them", "parameter", "value", "95% interval", rows=rows, right=("value", "95% interval"))
     scored = [
-        (s.model, f"{s.brier:.4f}", f"{s.log_loss:.4f}", f"{s.difference:+.4f} ({s.low:+.4f} to {s.high:+.4f})")
+        (
+            s.model,
+            f"{s.brier:.4f}",
+            f"{s.log_loss:.4f}",
+            f"{s.difference:+.4f} ({s.low:+.4f} to {s.high:+.4f})" if s.low or s.high else "reference",
+        )
         for s in scores
     ]
     columns = ("Brier", "log loss", "Brier difference")

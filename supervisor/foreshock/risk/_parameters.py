@@ -73,6 +73,7 @@ class RiskParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
         c: saturation of recurrence of Eq. 1.
         kappa: weight of the cascade lift, >= 0.
         presence: strength of a precursor of severity 0, in 0..1; one of severity 1 has strength 1.
+        rho: scale of R against what nominal statistics alone gave, in 0..1; every r holds it already.
         window_s: the window that the numbers hold for.
         horizon_s: P is the probability of the accident within this time; 0 where nothing was calibrated.
         intervals: 95% intervals of the fitted scalars, by name.
@@ -88,6 +89,7 @@ class RiskParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     c: float = 1.2
     kappa: float = 1.0
     presence: float = 1.0
+    rho: float = 1.0
     window_s: float = 1.5
     horizon_s: float = 0.0
     intervals: dict[str, tuple[float, float]] = {}
@@ -100,6 +102,7 @@ class RiskParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
         within("c", self.c, 0.0, above=True)
         within("kappa", self.kappa, 0.0)
         within("presence", self.presence, 0.0, 1.0)
+        within("rho", self.rho, 0.0, 1.0)
         within("window_s", self.window_s, 0.0, above=True)
         within("horizon_s", self.horizon_s, 0.0)
         for k, pair in enumerate(self.correlation):
