@@ -14,6 +14,9 @@ __all__ = ["Body"]
 LEAST_RELEASE = 0.75
 """A reach-in is over below this share of its threshold."""
 
+LEAST_SPAN = 0.6
+"""A slope needs samples over at least this share of its window: fewer would be all noise."""
+
 
 class Body:
     """Follows one human pose by pose.
@@ -67,7 +70,8 @@ class Body:
             track.append((t_s, math.dist((0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])), centre)))
             while track[0][0] < t_s - self._window_s:
                 track.popleft()
-            if len(track) >= 4 and track[-1][1] - config.workspace_radius_m <= config.reach_within_m:
+            spans = len(track) >= 3 and t_s - track[0][0] >= LEAST_SPAN * config.reach_window_s
+            if spans and track[-1][1] - config.workspace_radius_m <= config.reach_within_m:
                 speed = -_slope(track)
                 if speed > fastest:
                     fastest = speed

@@ -44,7 +44,10 @@ class PeopleDetector:
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:  # noqa: ARG002  # time is the samples' own
         """Four indications per human; one each without a subject while nobody is there."""
         centre = self._centre(inputs)
-        for sample in inputs.new.get("humans", ()):
+        poses = inputs.new.get("humans", ())
+        if self._stamp_ns < 0 and not poses and "humans" in inputs.latest:
+            poses = (inputs.latest["humans"],)  # it came before all inputs were there
+        for sample in poses:
             if isinstance(sample.value, Humans) and sample.stamp_ns > self._stamp_ns:
                 self._take(sample, sample.value, centre)
         if self._stamp_ns < 0:
@@ -61,10 +64,10 @@ class PeopleDetector:
             if tracked.distance_m > self._config.shared_m:
                 attention.outside()
             else:
-                for sample in inputs.new.get(name, ()):
+                latest = inputs.latest.get(name)
+                for sample in inputs.new.get(name) or ((latest,) if latest is not None else ()):
                     if isinstance(sample.value, Gaze):
                         attention.push(sample.stamp_ns, sample.value, tracked.head, centre)
-                latest = inputs.latest.get(name)
                 blind_ns = round(self._config.dropout_s * 1e9)
                 if latest is None or attention.stamp_ns < 0 or latest.stamp_ns - attention.stamp_ns > blind_ns:
                     missing = True

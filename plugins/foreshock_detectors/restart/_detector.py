@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from foreshock.detector import Inputs
 from foreshock.messages import JointState, MotionCommand, Odometry, TaskPhase
-from foreshock.records import Indication, SampleRef
+from foreshock.records import Indication, Sample, SampleRef
 from foreshock_detectors.restart._command import Commands
 from foreshock_detectors.restart._config import RestartConfig
 from foreshock_detectors.restart._held import Held
@@ -46,15 +46,15 @@ class RestartDetector:
 
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:  # noqa: ARG002  # time is the samples' own
         """Five indications, four without the plan's phase."""
-        for sample in inputs.new.get("command", ()):
+        for sample in _fresh(inputs, "command", self._commands.stamp_ns):
             if isinstance(sample.value, MotionCommand):
                 self._command_channel = sample.channel
                 self._commands.push(sample.stamp_ns, sample.value)
-        for sample in inputs.new.get("phase", ()):
+        for sample in _fresh(inputs, "phase", self._timing.stamp_ns):
             if isinstance(sample.value, TaskPhase):
                 self._phase_channel = sample.channel
                 self._timing.push(sample.stamp_ns, sample.value)
-        for sample in inputs.new.get("motion", ()):
+        for sample in _fresh(inputs, "motion", self._motion.stamp_ns):
             speed = self._speed(sample.value)
             self._measured = speed == speed
             if self._measured and sample.stamp_ns > self._motion.stamp_ns:
@@ -99,7 +99,8 @@ class RestartDetector:
             self._unasked = False
         self._unexpected.push(speed if self._unasked else 0.0, now_ns, self._unasked)
 
-        self._late.push(self._late_s(now_ns), now_ns, self._late_s(now_ns) > c.stopping_s)
+        late = self._late_s(now_ns)
+        self._late.push(late, now_ns, late > c.stopping_s)
 
         margin = max(c.overshoot_m_s, c.overshoot_share * most)
         over = speed - most if since_s <= c.start_s else 0.0
@@ -112,10 +113,18 @@ class RestartDetector:
         self._mismatch.push(off, now_ns, off > c.mismatch_s)
 
     def _late_s(self, now_ns: int) -> float:
-        """Time since a stop was asked for and has not been reached (s). Motion after a standstill is another start."""
+        """Time since a stop was asked for, while it moves on (s). Motion after a rest is another start."""
         stop_ns = self._commands.stop_ns
         if stop_ns != self._stop_ns:
             self._stop_ns, self._stopped = stop_ns, self._motion.resting
         if stop_ns < 0 or self._motion.resting:
             self._stopped = True
-        return 0.0 if self._stopped or now_ns < stop_ns else (now_ns - stop_ns) * 1e-9
+        done = self._stopped or self._motion.standing or now_ns < stop_ns
+        return 0.0 if done else (now_ns - stop_ns) * 1e-9
+
+
+def _fresh(inputs: Inputs, name: str, known_ns: int) -> Sequence[Sample]:
+    """What is new of an input; at first, what came before all inputs were there."""
+    if known_ns < 0 and not inputs.new.get(name) and name in inputs.latest:
+        return (inputs.latest[name],)
+    return inputs.new.get(name, ())

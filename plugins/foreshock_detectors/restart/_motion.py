@@ -16,6 +16,7 @@ class Motion:
         stamp_ns: of the last sample, -1 before the first.
         speed: its magnitude (m/s).
         acceleration: least squares slope of the speed over the last slope_s (m/s^2), 0 until that is full.
+        standing: the last sample is below the standstill speed; at a turning point so is one, too.
         resting: it has stood for rest_s and has not started since.
         started: the last sample is the one that made a start certain.
         start_ns: stamp of the first sample of the last start from rest, -1 before the first.
@@ -28,14 +29,15 @@ class Motion:
         self._track: deque[tuple[int, float]] = deque()
         self._still_ns = self._moving_ns = -1
         self.stamp_ns, self.speed, self.acceleration = -1, 0.0, 0.0
-        self.resting = self.started = False
+        self.standing = self.resting = self.started = False
         self.start_ns = -1
 
     def push(self, stamp_ns: int, speed: float) -> None:
         """The next speed (m/s)."""
         self.stamp_ns, self.speed = stamp_ns, speed
         self.started = False
-        if speed < self._still:
+        self.standing = speed < self._still
+        if self.standing:
             if self._still_ns < 0:
                 self._still_ns = stamp_ns
             if stamp_ns - self._still_ns >= self._rest_ns:

@@ -48,7 +48,7 @@ class Timing:
             if motion.resting:
                 self._met = True
             elif not self._met:
-                off = elapsed_s - self._stopping_s
+                off = 0.0 if motion.standing else elapsed_s - self._stopping_s
             elif motion.started:
                 off = (self._due_ns - motion.start_ns) * 1e-9
         elif not motion.resting:
