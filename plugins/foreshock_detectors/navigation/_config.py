@@ -52,7 +52,8 @@ class NavigationConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         walking_m_s: assumed walking speed of people (m/s), ISO 13855.
         speed_limit_m_s: the robot's own limit (m/s).
         free_least_m: free width that robot and human need (m): 0.5 m for a body, 0.18 m for a leg, ISO 13854.
-        walled_least_m: free width between robot and wall, less the human's own, that a human needs (m), ISO 13854.
+        walled_least_m: room between robot and wall beside the human's own (m), where one stands behind him: the
+            least clear width of a walkway, ISO 14122-2.
         lookahead_s: narrow space is judged along the robot's way for so long (s): reaction and stopping.
         hold_s: how long a verdict stands after its reason has gone (s).
         max_age_s: age at which odometry is stale (s).
@@ -87,7 +88,7 @@ class NavigationConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     walking_m_s: float = 1.6
     speed_limit_m_s: float = 1.0
     free_least_m: float = 0.5
-    walled_least_m: float = 0.5
+    walled_least_m: float = 0.6
     lookahead_s: float = 1.0
     hold_s: float = 0.3
     max_age_s: float = 0.1
