@@ -33,9 +33,9 @@ class CoCarryConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         low_hz: lower edge of the band of a gait (Hz): below it the load is moved on purpose.
         high_hz: upper edge (Hz); people step at up to 2.5 Hz (Winter, 1991).
         phase_time_constant_s: of the averages that the lag comes from (s): half a step; the lag of
-            two pure sines then ripples by 0.15 rad.
-        least_coherence: two swings of less coherence have no common rhythm, and so no lag. It does not keep noise out, of
-            which a quarter has more in this window: the least swings do.
+            two pure sines then ripples by up to asin(1 / (2 w tau)), 0.17 rad at 1.8 Hz.
+        least_coherence: two swings of less coherence have no common rhythm, and so no lag. It does not keep noise out,
+            a quarter of which has more in this window: the least swings do.
         least_swing_m_s: RMS velocity of an end below which it is at rest (m/s). White noise leaves at most 0.82 of its
             deviation in the band in 2000 s at 50 Hz (measured), a tracker's 0.02 m/s hence 0.017 m/s.
         least_swing_n: RMS force below which there is no swing (N); by the same, 2 N of noise leave at most 1.7 N.
