@@ -29,7 +29,7 @@ class RecoveryConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         torso_rate_full_rad_s: rate of severity 1.
         reaction_s: T_r, from the measurement to the command to stop: two frames of a 20 Hz tracker.
         stopping_s: T_s, until the arm stands: balance has priority over a stop, so that an arm thrown to save it
-            comes to rest with the end of its swing, a quarter of the 1.2 s that an arm of 0.7 m takes for one as a pendulum.
+            comes to rest with the end of its swing; a stretched arm of 0.7 m, a rod, swings with a period of 1.4 s.
         stopping_speed_ratio: mean speed over T_s as a share of that at its start; 0.5 is constant deceleration.
         v_h_m_s: speed of a person that is not measured: reaching, 2.0 m/s (ISO 13855:2010, 6.2).
         c_m: C, intrusion distance; 0 where perception tracks the whole body and no limb is hidden from it.
