@@ -34,6 +34,7 @@ class PlantVariable(msgspec.Struct, frozen=True):
         description: for people.
         min: smallest legal value, for each scalar.
         max: largest legal value.
+        depends: of an output, the inputs that it depends on directly, not through the state; None if that is not said.
     """
 
     name: str
@@ -45,6 +46,7 @@ class PlantVariable(msgspec.Struct, frozen=True):
     description: str
     min: float
     max: float
+    depends: tuple[str, ...] | None = None
 
     @property
     def symbol(self) -> str:
@@ -125,9 +127,21 @@ def _variable(table: TomlTable) -> PlantVariable:
         if not low <= value <= high:
             table.fail("start", f"{value!r} is outside [{low!r}, {high!r}]")
     text = table.text("description", "")
+    depends = _depends(table, causality)
     table.done()
     index = None if first is None else int(first)
-    return PlantVariable(base, index, size, start, cast(Causality, causality), unit, text, low, high)
+    return PlantVariable(base, index, size, start, cast(Causality, causality), unit, text, low, high, depends)
+
+
+def _depends(table: TomlTable, causality: str) -> tuple[str, ...] | None:
+    value = table.raw("depends")
+    if value is None:
+        return None
+    if causality != "output":
+        table.fail("depends", f"is given, but {causality} is its causality", "; an output depends on inputs")
+    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+        table.fail("depends", f"is {value!r}", "; expected a list of inputs")
+    return tuple(value)
 
 
 def _start(table: TomlTable, size: int, causality: str) -> tuple[float, ...]:
@@ -152,3 +166,9 @@ def _check_names(path: Path, variables: tuple[PlantVariable, ...]) -> None:
             problem = f"{v.name!r} clashes with {seen[v.symbol]!r}"
             raise ConfigError(f"{path}: variables", problem, "; names must differ in C too")
         seen[v.symbol] = v.name
+    inputs = [v.name for v in variables if v.causality == "input"]
+    for v in variables:
+        for name in v.depends or ():
+            if name not in inputs:
+                place = f"{path}: {v.name}.depends"
+                raise ConfigError(place, f"there is no input {name!r}", nearest(name, inputs))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TypeAlias
 from xml.etree import ElementTree
 
 from foreshock_fmus._description import PlantDescription, PlantVariable
@@ -103,7 +104,10 @@ def _time(reference: int) -> dict[str, str]:
     return {"name": "time", "valueReference": str(reference), "causality": "independent", "variability": "continuous"}
 
 
-def _scalars(plant: PlantDescription) -> list[tuple[str, int, PlantVariable]]:
+_Scalar: TypeAlias = tuple[str, int, PlantVariable]
+
+
+def _scalars(plant: PlantDescription) -> list[_Scalar]:
     return [(name, i, v) for v in plant.variables for i, name in enumerate(v.scalars())]
 
 
@@ -117,7 +121,9 @@ def _add_variables_3(root: Element, plant: PlantDescription) -> None:
     for tag in ("Output", "InitialUnknown"):
         for reference, (_, _, v) in enumerate(scalars):
             if v.causality == "output":
-                _add(structure, tag, valueReference=str(reference))
+                unknown = _add(structure, tag, valueReference=str(reference))
+                if tag == "Output":
+                    _add_dependencies(unknown, v, scalars, 0)
 
 
 def _add_variables_2(root: Element, plant: PlantDescription) -> None:
@@ -131,7 +137,23 @@ def _add_variables_2(root: Element, plant: PlantDescription) -> None:
     for tag in ("Outputs", "InitialUnknowns") if outputs else ():
         unknowns = _add(structure, tag)
         for i in outputs:
-            _add(unknowns, "Unknown", index=str(i))
+            unknown = _add(unknowns, "Unknown", index=str(i))
+            if tag == "Outputs":
+                _add_dependencies(unknown, scalars[i - 1][2], scalars, 1)
+
+
+def _add_dependencies(unknown: Element, v: PlantVariable, scalars: Sequence[_Scalar], at: int) -> None:
+    """What an output depends on directly; left out, the standard takes it to depend on everything (FMI 2.0.4, 2.2.8).
+
+    Args:
+        unknown: the element.
+        v: the output.
+        scalars: all scalars in order.
+        at: number of the first: value references begin at 0, FMI 2's indices at 1.
+    """
+    if v.depends is not None:
+        inputs = (str(k) for k, (_, _, u) in enumerate(scalars, start=at) if u.name in v.depends)
+        unknown.set("dependencies", " ".join(inputs))
 
 
 def _add(parent: Element, tag: str, **attributes: str) -> Element:

@@ -60,17 +60,26 @@ def build_twin(scenario: Scenario, registry: Registry, scratch: Path) -> Twin:
     """The twin that a scenario names, with its files in scratch."""
     place = f"{scenario.id}: twin"
     spec = registry.twin(scenario.twin["kind"], f"{place}.kind")
-    table = {k: v for k, v in scenario.twin.items() if k != "kind"}
-    for key in ("fmu", "binding", "plant"):
-        value = table.get(key)
-        if isinstance(value, str) and value and (key != "plant" or "/" in value):
-            table[key] = str(Path(scenario.folder) / value)
+    table = _placed({k: v for k, v in scenario.twin.items() if k != "kind"}, Path(scenario.folder))
     scratch.mkdir(parents=True, exist_ok=True)
     return spec.build(convert(table, spec.config, place), scenario.supervisor().supervisor.robot, scratch)
 
 
 _BENCH: dict[bytes, Any] = {}
 """Twins and supervisors that this worker has built, by what they were built from."""
+
+
+def _placed(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """A twin's table with its paths starting from a folder, those of its parts as well."""
+    placed = dict(table)
+    for key in ("fmu", "binding", "plant"):
+        value = table.get(key)
+        if isinstance(value, str) and value and (key != "plant" or "/" in value):
+            placed[key] = str(folder / value)
+    parts = table.get("parts")
+    if isinstance(parts, dict):
+        placed["parts"] = {k: _placed(v, folder) if isinstance(v, dict) else v for k, v in parts.items()}
+    return placed
 
 
 def _work(job: Job, scratch: str) -> Run:

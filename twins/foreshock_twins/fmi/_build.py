@@ -23,7 +23,7 @@ from foreshock_twins.fmi._variables import Variables
 if TYPE_CHECKING:
     from foreshock_twins.fmi import FmiTwinConfig
 
-__all__ = ["build"]
+__all__ = ["build", "check_step", "files_of", "need_fmpy", "open_fmu"]
 
 
 def build(config: FmiTwinConfig, robot: str, scratch: Path) -> FmuTwin:
@@ -32,19 +32,19 @@ def build(config: FmiTwinConfig, robot: str, scratch: Path) -> FmuTwin:
     Raises:
         BadInputError: see foreshock_twins.fmi.build_twin.
     """
-    _need_fmpy()
-    fmu, binding_path = _files(config)
-    description, folder = _open(fmu, scratch)
+    need_fmpy()
+    fmu, binding_path = files_of(config)
+    description, folder = open_fmu(fmu, scratch)
     variables = Variables(description, fmu.name)
     binding = read_binding(binding_path, variables)
-    _check_step(description, binding, binding_path)
+    check_step(description, binding, binding_path)
     layout = Layout(binding.items())
     log = FmuLog(scratch / "fmu.log")
     instance = FmuInstance(description, fmu, folder, layout, log)
     return FmuTwin(robot, variables, binding, layout, instance, log)
 
 
-def _need_fmpy() -> None:
+def need_fmpy() -> None:
     """Import what is used of FMPy, so that a missing or broken one is said before anything is built.
 
     Raises:
@@ -58,7 +58,7 @@ def _need_fmpy() -> None:
         raise MissingExtraError("twin fmu", problem, "; run: pip install 'foreshock[fmi]'") from error
 
 
-def _files(config: FmiTwinConfig) -> tuple[Path, Path]:
+def files_of(config: FmiTwinConfig) -> tuple[Path, Path]:
     """The FMU and the binding that the configuration means."""
     if bool(config.plant) == bool(config.fmu):
         raise ConfigError("twin", "give one of plant and fmu", f"; plant is {config.plant!r}, fmu is {config.fmu!r}")
@@ -73,7 +73,7 @@ def _files(config: FmiTwinConfig) -> tuple[Path, Path]:
     return fmu, Path(config.binding)
 
 
-def _open(fmu: Path, scratch: Path) -> tuple[Any, Path]:
+def open_fmu(fmu: Path, scratch: Path) -> tuple[Any, Path]:
     """Extract the FMU into a new folder under scratch and read its model description, validated."""
     import fmpy
     from fmpy.model_description import ValidationError
@@ -95,7 +95,7 @@ def _open(fmu: Path, scratch: Path) -> tuple[Any, Path]:
     return description, folder
 
 
-def _check_step(description: Any, binding: Binding, path: Path) -> None:
+def check_step(description: Any, binding: Binding, path: Path) -> None:
     """An FMU with a fixed internal step can only be called at multiples of it (FMI 3.0, 4.3)."""
     fixed = description.coSimulation.fixedInternalStepSize
     if fixed is None or float(fixed) <= 0.0:

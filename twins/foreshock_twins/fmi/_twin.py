@@ -4,22 +4,44 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 from foreshock.clock import NS_PER_S
 from foreshock.errors import BadInputError, ConfigError, TwinError, nearest
 from foreshock.records import Intervention, Sample
 from foreshock.twin import Channel, Parameters, TwinEvent
 from foreshock_twins.fmi._binding import Binding, InputTarget
-from foreshock_twins.fmi._instance import FmuInstance
 from foreshock_twins.fmi._layout import Layout, Reader, Values
 from foreshock_twins.fmi._log import FmuLog
 from foreshock_twins.fmi._referee import Referee
 from foreshock_twins.fmi._variables import Variable, Variables
 
-__all__ = ["FmuTwin"]
+__all__ = ["FmuTwin", "Stepper"]
 
 # Seeds are reduced to what the parameter's type can hold exactly.
 _SEED_MODULUS = {"Real": 2**53, "Float64": 2**53, "Float32": 2**24}
+
+
+class Stepper(Protocol):
+    """What runs behind the twin: one FMU, or several that are connected."""
+
+    def reset(self) -> None:
+        """Back to the state after instantiation."""
+
+    def initialize(self, values: Mapping[Variable, float]) -> None:
+        """Set parameters and start values, then initialize at time 0."""
+
+    def set(self, values: Mapping[Variable, float], t: float = 0.0) -> None:
+        """Set inputs at time t (s)."""
+
+    def step(self, t: float, h: float) -> Values:
+        """Advance from t by h (s), and read."""
+
+    def read(self, t: float) -> Values:
+        """All bound values at time t (s)."""
+
+    def close(self) -> None:
+        """Free everything; idempotent."""
 
 
 class FmuTwin:
@@ -35,7 +57,7 @@ class FmuTwin:
     """
 
     def __init__(
-        self, robot: str, variables: Variables, binding: Binding, layout: Layout, instance: FmuInstance, log: FmuLog
+        self, robot: str, variables: Variables, binding: Binding, layout: Layout, instance: Stepper, log: FmuLog
     ) -> None:
         self._variables, self._binding, self._instance, self._log = variables, binding, instance, log
         self._channels = tuple(Channel(c.name, c.type, c.every * binding.step_ns) for c in binding.channels)

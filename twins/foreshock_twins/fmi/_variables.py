@@ -69,6 +69,10 @@ class Variables(Mapping[str, Variable]):
     def __len__(self) -> int:
         return len(self._known)
 
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Shape of an array; empty for a scalar."""
+        return tuple(self._shapes.get(name, ()))
+
     def find(self, name: str, place: str) -> Variable:
         """A variable that holds a number.
 

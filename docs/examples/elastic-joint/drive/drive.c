@@ -1,0 +1,47 @@
+/* J q'' = (1 - derate) (K (q_wanted - q) - D q') - torque, torque = k (q - link) + d (q' - link'), by RK4. */
+#include <math.h>
+
+#include "plant.h"
+
+struct Plant {
+    double angle, rate;
+};
+
+const size_t plant_size = sizeof(struct Plant);
+
+static double torque(const double *vars, double angle, double rate) {
+    return vars[V_stiffness] * (angle - vars[V_link_angle]) + vars[V_loss] * (rate - vars[V_link_rate]);
+}
+
+static double acceleration(const double *vars, double t, double angle, double rate) {
+    const double wanted = vars[V_amplitude] * sin(6.283185307179586 * t / vars[V_period]);
+    const double motor = vars[V_gain] * (wanted - angle) - vars[V_damping] * rate;
+    return ((1.0 - vars[V_derate]) * motor - torque(vars, angle, rate)) / vars[V_inertia];
+}
+
+static void publish(const Plant *self, double *vars) {
+    vars[V_angle] = self->angle;
+    vars[V_torque] = torque(vars, self->angle, self->rate);
+}
+
+int plant_init(Plant *self, double *vars) {
+    publish(self, vars);
+    return PLANT_OK;
+}
+
+int plant_step(Plant *self, double *vars, double t, double h) {
+    const double a = self->angle, v = self->rate;
+    const double k1 = acceleration(vars, t, a, v);
+    const double v2 = v + 0.5 * h * k1, k2 = acceleration(vars, t + 0.5 * h, a + 0.5 * h * v, v2);
+    const double v3 = v + 0.5 * h * k2, k3 = acceleration(vars, t + 0.5 * h, a + 0.5 * h * v2, v3);
+    const double v4 = v + h * k3, k4 = acceleration(vars, t + h, a + h * v3, v4);
+    self->angle = a + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4);
+    self->rate = v + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+    publish(self, vars);
+    return PLANT_OK;
+}
+
+const char *plant_message(const Plant *self) {
+    (void)self;
+    return "";
+}
