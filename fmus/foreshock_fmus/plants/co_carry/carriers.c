@@ -3,9 +3,9 @@
 
 #include "model.h"
 
-#define NOISE_S 1.5 /* s, correlation of the partner's cadence and bounce */
-#define SHARE_S 0.5 /* s, in which an overload tells on the robot's legs */
-#define LEAST_M 0.0 /* m above the floor, where a lowered load rests on its bottom */
+#define NOISE_S 1.5   /* s, correlation of the partner's cadence and bounce */
+#define SHARE_S 0.5   /* s, in which an overload tells on the robot's legs */
+#define HAND_M_S2 0.7 /* m/s2, with which a load is put down */
 
 static double min_jerk(double s) {
     s = clip(s, 0.0, 1.0);
@@ -30,10 +30,13 @@ static void walk(Carrier *c, const double *vars, double slow, double hold, doubl
     c->walk += clip(goal - c->walk, -most, most);
 }
 
+/* Down at lower_speed and up again at half of it, with an acceleration and a way to brake that hands can follow. */
 static void lower(Carrier *c, const double *vars, double down, double dt) {
-    const double goal = down > 0.5 ? vars[V_grip_height] + LEAST_M : vars[V_carry_height];
-    const double most = (down > 0.5 ? vars[V_lower_speed] : 0.5 * vars[V_lower_speed]) * dt;
-    c->height += clip(goal - c->height, -most, most);
+    const double goal = down > 0.5 ? vars[V_grip_height] : vars[V_carry_height], left = goal - c->height;
+    const double fastest = down > 0.5 ? vars[V_lower_speed] : 0.5 * vars[V_lower_speed];
+    const double braking = sqrt(2.0 * HAND_M_S2 * fabs(left)), wanted = copysign(fmin(fastest, braking), left);
+    c->speed += clip(wanted - c->speed, -HAND_M_S2 * dt, HAND_M_S2 * dt);
+    c->height += dt * c->speed;
 }
 
 void carriers_tick(Plant *self, const double *vars, double t, double dt) {

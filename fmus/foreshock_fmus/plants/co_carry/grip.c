@@ -16,7 +16,7 @@ void grip_tick(Plant *self, const double *vars, double dt) {
     self->mean += off * fmin(1.0, dt / vars[V_grip_average]);
     self->spread += (off * off - self->spread) * fmin(1.0, dt / SPREAD_S);
     /* A load that is moved as A sin(phase) weighs more by -A w^2 sin(phase). */
-    const double swing = -sqrt(2.0 * self->spread) * sin(self->plan_phase + vars[V_grip_phase]);
+    const double swing = -robot->walk * sqrt(2.0 * self->spread) * sin(self->plan_phase + vars[V_grip_phase]);
     const double wanted = vars[V_grip_margin] * (self->mean + swing) / (2.0 * vars[V_grip_friction]);
     self->command = clip(wanted + vars[V_regrasp_force] * self->act[REGRASP], PASSIVE_N, vars[V_grip_max]);
     self->grip += (self->command - self->grip) * fmin(1.0, dt / vars[V_grip_lag]);

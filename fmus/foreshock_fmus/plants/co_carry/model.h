@@ -14,7 +14,7 @@ enum { SLOW, HOLD, LOWER, REGRASP, ACTS };
 enum { FRAMES = 16, FRAME = V_leg_force - V_sensor_time, PAST = 1024 };
 
 /* What one carrier's hands do: where they want to be, and the force that follows. */
-typedef struct { double phase, walk, height, wanted, rate, force, lost; } Carrier;
+typedef struct { double phase, walk, height, speed, wanted, rate, force, lost; } Carrier;
 
 struct Plant {
     long long step;
