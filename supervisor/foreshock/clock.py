@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import time
 
-__all__ = ["NS_PER_S", "cpu_ns", "monotonic_ns", "ns", "seconds", "today"]
+__all__ = ["NS_PER_S", "cpu_ns", "monotonic_ns", "ns", "seconds", "sleep_until", "today", "wall_ns"]
 
 NS_PER_S = 1_000_000_000
 
@@ -23,6 +23,18 @@ def seconds(nanoseconds: int) -> float:
 def monotonic_ns() -> int:
     """The local monotonic clock in nanoseconds."""
     return time.monotonic_ns()
+
+
+def wall_ns() -> int:
+    """Nanoseconds since 1970, UTC: to name things by, never to measure with."""
+    return time.time_ns()
+
+
+def sleep_until(monotonic: int) -> None:
+    """Sleep until this time of the monotonic clock; at once if it has passed."""
+    left_ns = monotonic - time.monotonic_ns()
+    if left_ns > 0:
+        time.sleep(left_ns / NS_PER_S)
 
 
 def cpu_ns() -> int:

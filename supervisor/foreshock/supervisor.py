@@ -97,6 +97,15 @@ class Supervisor:
         """Specs of the detectors that run, by id."""
         return tuple(c.spec for c in self._pipeline.detectors)
 
+    def channels(self) -> list[tuple[str, type]]:
+        """Every channel that a detector reads by name, with the message class that it wants there."""
+        return [(i.channel, i.type) for c in self._pipeline.detectors for i in c.inputs if i.channel != "*"]
+
+    def required_channels(self) -> frozenset[str]:
+        """Channels without which some detector observes nothing."""
+        needs = [i for c in self._pipeline.detectors for i in c.inputs]
+        return frozenset(i.channel for i in needs if i.required and i.channel != "*")
+
     def reset(self, seed: int, now_ns: int = 0) -> None:
         """Forget everything; warm-up begins at now_ns."""
         self._state = self._pipeline.reset(seed, now_ns)

@@ -18,13 +18,17 @@ from foreshock.cli.detectors_cmd import detectors
 from foreshock.cli.events_cmd import events
 from foreshock.cli.gates_cmd import gates
 from foreshock.cli.journal_cmd import journal
+from foreshock.cli.operator_cmd import reset
 from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, TERMINATED, emit, notes
 from foreshock.cli.policies_cmd import policies
 from foreshock.cli.replay_cmd import replay
+from foreshock.cli.run_cmd import run
 from foreshock.cli.scenarios_cmd import scenarios
 from foreshock.cli.sensitivity_cmd import sensitivity
 from foreshock.cli.simulate_cmd import simulate
 from foreshock.cli.taxonomy_cmd import taxonomy
+from foreshock.cli.top_cmd import top
+from foreshock.cli.twin_cmd import twin
 from foreshock.errors import BadInputError, ForeshockError, TwinError, nearest
 
 __all__ = ["cli", "main"]
@@ -69,8 +73,8 @@ def cli() -> None:
 
 
 COMMANDS = (
-    calibrate, config, demo, detectors, events, gates, journal, policies, replay, scenarios, sensitivity, simulate,
-    taxonomy,
+    calibrate, config, demo, detectors, events, gates, journal, policies, replay, reset, run, scenarios, sensitivity,
+    simulate, taxonomy, top, twin,
 )  # fmt: skip
 for command in COMMANDS:
     cli.add_command(command)

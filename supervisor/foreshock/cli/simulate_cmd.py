@@ -36,7 +36,7 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
 
 @click.command()
 @click.argument("scenario")
-@click.option("--twin", help="Kind of twin to run it on; the scenario's own by default.")
+@click.option("--twin", help="Kind of twin, or KIND:ENDPOINT; the scenario's own by default.")
 @click.option(
     "--supervisor",
     "arm",
@@ -79,8 +79,9 @@ def simulate(
     registry = Registry()
     found = find_scenario(scenario, registry).with_(parameters, policy)
     if twin is not None and twin != found.twin["kind"]:
-        registry.twin(twin, "--twin")
-        found = msgspec.structs.replace(found, twin={"kind": twin})
+        kind, _, endpoint = twin.partition(":")
+        registry.twin(kind, "--twin")
+        found = msgspec.structs.replace(found, twin={"kind": kind, **({"endpoint": endpoint} if endpoint else {})})
     if duration is not None:
         found = msgspec.structs.replace(found, duration_s=duration)
     if journal is not None and arm == "off":

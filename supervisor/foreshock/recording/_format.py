@@ -29,6 +29,7 @@ class Head(msgspec.Struct, frozen=True):
         foreshock: version of the program that wrote it.
         python: version and platform, since floating-point libraries differ between platforms.
         plugins: distribution and version of every detector and policy.
+        segment: number of the file within its run; one above 0 begins in the middle.
     """
 
     config: dict[str, object]
@@ -39,6 +40,7 @@ class Head(msgspec.Struct, frozen=True):
     foreshock: str = ""
     python: str = ""
     plugins: dict[str, str] = {}
+    segment: int = 0
 
 
 class SampleNote(msgspec.Struct, frozen=True, array_like=True):

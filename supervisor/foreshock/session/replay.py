@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from foreshock.config import Config, parse_config
+from foreshock.errors import BadInputError
 from foreshock.journal import DigestJournal, Journal
 from foreshock.recording import JournalFile
 from foreshock.records import Decision
@@ -73,6 +74,9 @@ def replay(
     """
     file = JournalFile(path)
     head = file.head
+    if head.segment and config is None:
+        problem = f"is segment {head.segment} of its run, and begins in the middle"
+        raise BadInputError(str(path), problem, "; replay segment 0, or ask what would have happened with --config")
     mine = parse_config(head.config, f"{path}: config") if config is None else config
     supervisor = Supervisor(mine, Path(head.base) if config is None else base, registry)
     chain = DigestJournal()

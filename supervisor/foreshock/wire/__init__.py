@@ -3,17 +3,35 @@
 from foreshock.wire._attachment import Attachment, pack_attachment, unpack_attachment
 from foreshock.wire._codec import MAX_BYTES, Codec, decode_reference, decode_ros, encode_reference, encode_ros
 from foreshock.wire._keys import Keys, Naming, dds_name, liveliness_token
+from foreshock.wire._lockstep import (
+    PROTOCOL,
+    ChannelNote,
+    Hello,
+    Request,
+    Stepped,
+    WireSample,
+    check_hello,
+    pack_samples,
+    unpack_samples,
+)
 from foreshock.wire._ros import BY_ROS, ROS_NAMES
 from foreshock.wire._types import definitions, rihs01, ros_type, typestore
 
 __all__ = [
     "BY_ROS",
     "MAX_BYTES",
+    "PROTOCOL",
     "ROS_NAMES",
     "Attachment",
+    "ChannelNote",
     "Codec",
+    "Hello",
     "Keys",
     "Naming",
+    "Request",
+    "Stepped",
+    "WireSample",
+    "check_hello",
     "dds_name",
     "decode_reference",
     "decode_ros",
@@ -22,8 +40,10 @@ __all__ = [
     "encode_ros",
     "liveliness_token",
     "pack_attachment",
+    "pack_samples",
     "rihs01",
     "ros_type",
     "typestore",
     "unpack_attachment",
+    "unpack_samples",
 ]

@@ -55,6 +55,11 @@ class MotionGuard:
         self._asked = {n: t for n, t in self._asked.items() if n > lease.nonce}
         return True
 
+    @property
+    def until_ns(self) -> int:
+        """When the permission ends, on the guard's clock; -1 before the first lease."""
+        return self._until_ns
+
     def permitted(self, guard_ns: int) -> bool:
         """Whether the robot may move now; when this turns False, it goes to its minimal risk condition by itself."""
         return guard_ns < self._until_ns

@@ -1,0 +1,55 @@
+"""``foreshock run``: a live supervisor."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import click
+
+from foreshock.cli.output import OK, console, emit, notes
+from foreshock.live import LiveSupervisor, load_run
+from foreshock.records import Decision, ProtectionLevel
+
+__all__ = ["run"]
+
+
+@click.command()
+@click.argument("config", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@click.option("--seconds", type=click.FloatRange(0.0, min_open=True), help="End after this time; never by default.")
+@click.option("--json", "as_json", is_flag=True, help="Print the status at the end as JSON.")
+def run(config: Path, seconds: float | None, as_json: bool) -> int:
+    """Supervise a robot live over Zenoh, as CONFIG says, until SIGINT or SIGTERM.
+
+    It takes the robot's streams, and publishes decisions, interventions, health and the motion lease; watch it with
+    foreshock top.
+    """
+    live = LiveSupervisor(load_run(config), config.parent)
+    stop = threading.Event()
+    last = ProtectionLevel.NORMAL
+    timer = threading.Timer(seconds, stop.set) if seconds is not None else None
+
+    def ticked(decision: Decision) -> None:
+        nonlocal last
+        if decision.level is not last:
+            modes = ", ".join(m for m, level in decision.levels.items() if level)
+            notes.print(f"level {decision.level.name.lower().replace('_', '-')} {modes}", markup=False)
+            last = decision.level
+
+    if not as_json:
+        status = live.status()
+        notes.print(f"supervising {status.robot}, epoch {status.epoch}: {len(status.streams)} streams", markup=False)
+    if timer is not None:
+        timer.daemon = True
+        timer.start()
+    try:
+        final = live.run(stop, ticked)
+    finally:
+        if timer is not None:
+            timer.cancel()
+    if as_json:
+        emit(final)
+    else:
+        median, p99, most = final.tick_ms
+        console.print(f"{final.tick + 1} ticks, {median:.2f} ms median, {p99:.2f} ms p99, {most:.2f} ms at most")
+    return OK

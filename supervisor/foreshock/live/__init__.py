@@ -1,0 +1,21 @@
+"""A supervisor that runs beside a robot, over Zenoh (docs/live.md)."""
+
+from foreshock.live._config import RunConfig, load_run, parse_run
+from foreshock.live._run import LiveSupervisor
+from foreshock.live._serve import FreeRunning, SteppedServer
+from foreshock.live._services import ResetRequest
+from foreshock.live._settings import JournalSettings, LiveSettings
+from foreshock.live._status import Status
+
+__all__ = [
+    "FreeRunning",
+    "JournalSettings",
+    "LiveSettings",
+    "LiveSupervisor",
+    "ResetRequest",
+    "RunConfig",
+    "Status",
+    "SteppedServer",
+    "load_run",
+    "parse_run",
+]

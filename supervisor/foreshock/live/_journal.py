@@ -1,0 +1,74 @@
+"""Journal files of a live supervisor: one segment after the other, the oldest removed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+
+from foreshock.journal import NO_VERDICTS, OperatorReset
+from foreshock.live._settings import JournalSettings
+from foreshock.recording import Head, McapJournal
+from foreshock.records import Decision, Sample
+
+__all__ = ["SegmentedJournal"]
+
+
+class SegmentedJournal:
+    """Implements foreshock.journal.Journal.
+
+    Args:
+        folder: of the files.
+        stem: how their names begin; it holds the epoch, so that two runs never meet.
+        head: what a replay needs.
+        settings: when a new segment begins, and what is kept.
+        today_s: age of the oldest file that is kept is counted from here (s since 1970).
+    """
+
+    def __init__(self, folder: Path, stem: str, head: Head, settings: JournalSettings, today_s: float) -> None:
+        self._folder, self._stem, self._head, self._settings = folder, stem, head, settings
+        self._today_s = today_s
+        self._segment = 0
+        self._begun_ns = head.began_ns
+        self._open()
+
+    @property
+    def path(self) -> Path:
+        """Of the file that is written now."""
+        return self._file.path
+
+    def tick(self, samples: Sequence[Sample], decision: Decision, verdicts: Mapping[str, str] = NO_VERDICTS) -> None:
+        """Write a tick, in a new file if it is time."""
+        if decision.now_ns - self._begun_ns >= self._settings.segment_s * 1e9:
+            self._file.close()
+            self._segment += 1
+            self._begun_ns = decision.now_ns
+            self._head = msgspec.structs.replace(self._head, segment=self._segment)
+            self._open()
+        self._file.tick(samples, decision, verdicts)
+
+    def operator_reset(self, record: OperatorReset) -> None:
+        """Write an operator's reset."""
+        self._file.operator_reset(record)
+
+    def close(self) -> None:
+        """Close the file; idempotent."""
+        self._file.close()
+
+    def _open(self) -> None:
+        self._file = McapJournal(self._folder / f"{self._stem}-{self._segment:05d}.mcap", self._head)
+        self._retain()
+
+    def _retain(self) -> None:
+        """Remove the oldest files beyond size and age, never the one that is written."""
+        files = sorted(self._folder.glob("*.mcap"), key=lambda p: (p.stat().st_mtime, p.name))
+        total = sum(p.stat().st_size for p in files)
+        for path in files:
+            if path == self._file.path:
+                continue
+            old = self._today_s - path.stat().st_mtime > self._settings.max_age_s
+            if not old and total <= self._settings.max_bytes:
+                return
+            total -= path.stat().st_size
+            path.unlink()

@@ -1,0 +1,234 @@
+"""The live supervisor: Zenoh streams in, a tick at its rate on the monotonic clock, decisions and the lease out.
+
+One thread does everything: at each tick it takes what the rings hold, decides, tells the robot, answers questions.
+Zenoh fills the rings from threads of its own, so that a slow or flooding peer costs its own samples and nobody else's.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+from foreshock.clock import NS_PER_S, monotonic_ns, sleep_until, wall_ns
+from foreshock.errors import BadInputError, ConfigError, nearest
+from foreshock.journal import DigestJournal
+from foreshock.link import keys_of, open_link
+from foreshock.live._config import RunConfig
+from foreshock.live._journal import SegmentedJournal
+from foreshock.live._publish import decision_bytes
+from foreshock.live._robot import RobotLink
+from foreshock.live._services import Services
+from foreshock.live._status import Status, TickTimes, stream_status
+from foreshock.live._stream import Stream
+from foreshock.recording import Head
+from foreshock.records import Decision, ProtectionLevel, Sample
+from foreshock.registry import Registry
+from foreshock.supervisor import Supervisor
+from foreshock.wire import ROS_NAMES, Codec, typestore
+
+__all__ = ["LiveSupervisor"]
+
+BY_NAME = {cls.__name__: cls for cls in ROS_NAMES}
+
+
+class LiveSupervisor:
+    """Runs until it is told to stop.
+
+    Args:
+        run: what to run.
+        base: folder that relative paths of the configuration start from.
+        registry: of plugins.
+
+    Raises:
+        BadInputError: the configuration does not fit, or the link cannot be opened.
+    """
+
+    def __init__(self, run: RunConfig, base: Path | None = None, registry: Registry | None = None) -> None:
+        base = base or Path()
+        self._run, self.epoch = run, wall_ns()
+        self.supervisor = Supervisor(run.config, base, registry, epoch=self.epoch)
+        robot = run.config.supervisor.robot
+        channels = _channels(run, self.supervisor)
+        typestore()  # its definitions take half a second to load: not in the first tick
+        self._session = cast("Any", open_link(run.link, base))
+        try:
+            keys = keys_of(run.link, robot)
+            codec = Codec()
+            self._streams = [
+                Stream(self._session, keys, channel, cls, codec, run.live.max_skew_s)
+                for channel, cls in sorted(channels.items())
+            ]
+            self._robot = RobotLink(self._session, keys, run.live, self.epoch)
+            self._decisions = self._session.declare_publisher(keys.service("decision"))
+            self._services = Services(self._session, keys)
+            self._token = self._session.liveliness().declare_token(keys.alive("supervisor", str(self.epoch)))
+            self._began_ns = monotonic_ns()
+            self._digest = DigestJournal()
+        except BaseException:
+            self._session.close()
+            raise
+        self._base = base
+        self._journal: SegmentedJournal | None = None
+        self._needed = self.supervisor.required_channels()
+        self._missing = sorted(self._needed)
+        self._times = TickTimes()
+        self._history: deque[tuple[int, bytes]] = deque()
+        self._health: dict[str, str] = {}
+        self._decision: Decision | None = None
+        self._published_ns = -1
+        self._level: tuple[ProtectionLevel, ...] = ()
+
+    def run(self, stop: threading.Event, ticked: Callable[[Decision], None] | None = None) -> Status:
+        """Tick until stop is set; what there is to say at the end.
+
+        Args:
+            stop: ends it.
+            ticked: told of each decision.
+        """
+        period_ns = self.supervisor.period_ns
+        next_ns = monotonic_ns() + period_ns
+        try:
+            while not stop.is_set():
+                sleep_until(next_ns)
+                began_ns = monotonic_ns()
+                decision = self.tick(began_ns)
+                ended_ns = monotonic_ns()
+                self._times.add(ended_ns - began_ns)
+                if ticked is not None and decision is not None:
+                    ticked(decision)
+                next_ns += period_ns
+                if next_ns < ended_ns:
+                    self._times.overruns += 1
+                    next_ns = ended_ns
+            return self.status()
+        finally:
+            self.close()
+
+    def tick(self, now_ns: int) -> Decision | None:
+        """One tick at this time of the monotonic clock; None while streams have not begun, so that nothing is judged.
+
+        Nobody may move then, since no lease is granted.
+        """
+        samples: list[Sample] = []
+        for stream in self._streams:
+            samples += stream.drain(now_ns)
+        if self._missing:
+            self._missing = [s.channel for s in self._streams if s.arrived_ns < 0 and s.channel in self._needed]
+            if self._missing:
+                self._answer()
+                return None
+            self.supervisor.reset(0, now_ns)
+            self._began_ns = now_ns
+            self._journal = self._open_journal()
+        for reset in self._services.resets(self.supervisor, now_ns):
+            self._digest.operator_reset(reset)
+            if self._journal is not None:
+                self._journal.operator_reset(reset)
+        decision = self.supervisor.step(samples, now_ns)
+        self._robot.hear(now_ns)
+        self._robot.tell(decision, now_ns)
+        self._decision = decision
+        self._robot.grant(self.supervisor, now_ns, permitted=not self._robot.overdue(now_ns))
+        verdicts = self.supervisor.verdicts_of(decision)
+        self._digest.tick(samples, decision, verdicts)
+        if self._journal is not None:
+            self._journal.tick(samples, decision, verdicts)
+        for h in decision.health:
+            if h.state == "ok":
+                self._health.pop(h.source, None)
+            else:
+                self._health[h.source] = f"{h.state}: {h.reason}" if h.reason else h.state
+        self._publish(decision, now_ns)
+        self._answer()
+        return decision
+
+    def _answer(self) -> None:
+        self._services.answer(self.status, self._run, self.supervisor.taxonomy, self._history)
+
+    def status(self) -> Status:
+        """What there is to say, after the last tick."""
+        now_ns, d = monotonic_ns(), self._decision
+        overdue = self._robot.overdue(now_ns)
+        withheld = f"no guard has acknowledged {', '.join(overdue)}" if overdue else ""
+        if self._missing:
+            withheld = f"waiting for {', '.join(self._missing)}"
+        faults = {s.channel: f"link: {s.counts.last_fault}" for s in self._streams if s.counts.last_fault}
+        return Status(
+            robot=self._run.config.supervisor.robot,
+            epoch=self.epoch,
+            uptime_s=(now_ns - self._began_ns) / NS_PER_S,
+            tick=-1 if d is None else d.tick,
+            tick_ms=self._times.milliseconds(),
+            overruns=self._times.overruns,
+            level="" if d is None else d.level.name.lower(),
+            levels={} if d is None else {m: v.name.lower() for m, v in d.levels.items() if v},
+            trust=0.0 if d is None else d.trust.trust,
+            control_trust=0.0 if d is None else d.trust.control_trust,
+            trust_by_mode={} if d is None else d.trust.control_by_mode,
+            motion_permitted=d is not None and d.motion_permitted and not overdue,
+            withheld=withheld,
+            leases=self._robot.granted,
+            guards={name: (now_ns - at) / NS_PER_S for name, at in self._robot.guards.items()},
+            unacknowledged=tuple(overdue),
+            unknown_actions=self._robot.unknown,
+            interventions={} if d is None else {i.action: i.strength for i in d.interventions},
+            precursors=()
+            if d is None
+            else tuple(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in d.precursors if p.phase != "cleared"),
+            streams={s.channel: stream_status(s, now_ns) for s in self._streams},
+            health={**faults, **self._health},
+            peers=self._services.peers(),
+            journal="" if self._journal is None else str(self._journal.path),
+        )
+
+    def close(self) -> None:
+        """End the link, the journal and child processes; idempotent."""
+        if self._journal is not None:
+            self._journal.close()
+        self.supervisor.close()
+        self._session.close()
+
+    def _publish(self, decision: Decision, now_ns: int) -> None:
+        level = (decision.level, *decision.levels.values())
+        due = now_ns - self._published_ns >= NS_PER_S / self._run.live.decision_hz
+        if not due and level == self._level:
+            return
+        self._level, self._published_ns = level, now_ns
+        data = decision_bytes(decision, self.epoch, self._digest.digest)
+        self._decisions.put(data)
+        self._history.append((now_ns, data))
+        while self._history and now_ns - self._history[0][0] > self._run.live.history_s * NS_PER_S:
+            self._history.popleft()
+
+    def _open_journal(self) -> SegmentedJournal | None:
+        settings = self._run.journal
+        if not settings.folder:
+            return None
+        base = self._base
+        head = Head(self._run.tables, str(base.resolve()), 0, self._began_ns)
+        stem = f"{self._run.config.supervisor.robot}-{self.epoch}"
+        return SegmentedJournal(base / settings.folder, stem, head, settings, self.epoch / NS_PER_S)
+
+
+def _channels(run: RunConfig, supervisor: Supervisor) -> dict[str, type]:
+    """Every channel that a detector reads, or that the configuration adds, with its message class.
+
+    Raises:
+        ConfigError: two detectors want different types on one channel, or a type that does not exist.
+    """
+    found: dict[str, type] = {}
+    robot = run.config.supervisor.robot
+    for channel, cls in supervisor.channels():
+        if found.setdefault(channel, cls) is not cls:
+            problem = f"{cls.__name__} and {found[channel].__name__} are both read from it"
+            raise ConfigError(f"channel {channel}", problem)
+    for name, kind in run.live.streams.items():
+        if kind not in BY_NAME:
+            raise ConfigError(f"live.streams.{name}", f"there is no message {kind!r}", nearest(kind, BY_NAME))
+        found.setdefault(f"{robot}/{name}", BY_NAME[kind])
+    if not found:
+        raise BadInputError("live.streams", "no detector reads a channel, and none is given")
+    return found

@@ -1,0 +1,109 @@
+"""Questions that a live supervisor answers: status, taxonomy, configuration, recent decisions, an operator's reset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import msgspec
+
+from foreshock.errors import BadInputError
+from foreshock.journal import OperatorReset
+from foreshock.live._config import RunConfig
+from foreshock.live._status import Status
+from foreshock.supervisor import Supervisor
+from foreshock.taxonomy import Taxonomy
+from foreshock.wire import Keys
+
+__all__ = ["ResetRequest", "Services"]
+
+RING = 16
+MOST_BYTES = 10_000
+
+
+class ResetRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Payload of a reset: who asks, what was checked, which dimension of trust (``""``: all)."""
+
+    who: str
+    why: str
+    dimension: str = ""
+
+
+class Services:
+    """Queryables whose questions wait in rings until the tick's end.
+
+    Args:
+        session: open Zenoh session.
+        keys: of the robot.
+    """
+
+    def __init__(self, session: Any, keys: Keys) -> None:
+        import zenoh
+
+        self._asked = {
+            name: session.declare_queryable(keys.service(name), zenoh.handlers.RingChannel(RING))
+            for name in ("status", "taxonomy", "config", "history", "reset")
+        }
+        self._tokens = session.liveliness().declare_subscriber(
+            keys.alive("**", "").rstrip("/"), zenoh.handlers.RingChannel(256), history=True
+        )
+        self._alive: dict[str, None] = {}
+        self._put = zenoh.SampleKind.PUT
+
+    def peers(self) -> tuple[str, ...]:
+        """Tokens that are up: ``<role>/<name>``."""
+        while (token := self._tokens.try_recv()) is not None:
+            name = str(token.key_expr).partition("/_/alive/")[2]
+            if token.kind == self._put:
+                if len(self._alive) < 256:
+                    self._alive[name] = None
+            else:
+                self._alive.pop(name, None)
+        return tuple(sorted(self._alive))
+
+    def resets(self, supervisor: Supervisor, now_ns: int) -> Iterator[OperatorReset]:
+        """Do what operators ask for; the records."""
+        for query in _taken(self._asked["reset"]):
+            payload = query.payload.to_bytes() if query.payload is not None else b""
+            try:
+                if len(payload) > MOST_BYTES:
+                    raise BadInputError("reset", f"{len(payload)} bytes")
+                request = msgspec.json.decode(payload, type=ResetRequest)
+                record = supervisor.operator_reset(request.who, request.why, now_ns, request.dimension)
+            except (BadInputError, msgspec.MsgspecError) as e:
+                query.reply_err(str(e).encode())
+            else:
+                query.reply(query.key_expr, msgspec.json.encode(record))
+                yield record
+            query.drop()
+
+    def answer(
+        self,
+        status: Callable[[], Status],
+        run: RunConfig,
+        taxonomy: Taxonomy,
+        history: Iterable[tuple[int, bytes]],
+    ) -> None:
+        """Answer what was asked since the last tick."""
+        for query in _taken(self._asked["status"]):
+            _reply(query, msgspec.json.encode(status()))
+        for query in _taken(self._asked["taxonomy"]):
+            _reply(query, msgspec.json.encode(taxonomy))
+        for query in _taken(self._asked["config"]):
+            _reply(query, msgspec.json.encode(run.config))
+        for query in _taken(self._asked["history"]):
+            # length before each: a list of CDR payloads in one reply, so that they come in order or not at all
+            _reply(query, b"".join(len(data).to_bytes(4, "little") + data for _, data in history))
+
+
+def _taken(queryable: Any) -> Iterator[Any]:
+    for _ in range(RING):
+        query = queryable.try_recv()
+        if query is None:
+            return
+        yield query
+
+
+def _reply(query: Any, payload: bytes) -> None:
+    query.reply(query.key_expr, payload)
+    query.drop()

@@ -1,0 +1,140 @@
+"""One stream of samples over Zenoh: taken from a ring at each tick, so that no peer can make another wait."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from foreshock.clock import monotonic_ns
+from foreshock.errors import WireError
+from foreshock.live._clock import ClockOffset
+from foreshock.records import Sample
+from foreshock.wire import MAX_BYTES, ROS_NAMES, Codec, Keys, unpack_attachment
+
+__all__ = ["Stream", "StreamCounts"]
+
+RING = 256
+"""Of a stream that floods, the oldest samples are lost, and none of another stream."""
+SILENT_NS = 1_000_000_000
+"""Another sender is believed when the first has been silent for so long."""
+
+
+class StreamCounts(msgspec.Struct):
+    """What a stream has seen.
+
+    Attributes:
+        samples: that were taken.
+        gaps: sequence numbers that never came.
+        repeated: samples that came twice.
+        backwards: samples older than the one before.
+        garbage: payloads or attachments that could not be read.
+        foreign: samples of a second sender, while the first still sends.
+        unbelieved: samples whose clock had just jumped.
+        jumps: of the source's clock.
+        last_fault: what was wrong last, in words.
+    """
+
+    samples: int = 0
+    gaps: int = 0
+    repeated: int = 0
+    backwards: int = 0
+    garbage: int = 0
+    foreign: int = 0
+    unbelieved: int = 0
+    jumps: int = 0
+    last_fault: str = ""
+
+
+class Stream:
+    """Subscribes to one channel.
+
+    Args:
+        session: open Zenoh session.
+        keys: of the robot.
+        channel: ``<robot>/<subject>/<quantity>``.
+        cls: message class that it must carry.
+        codec: that knows the layouts.
+        max_skew_s: see ClockOffset.
+    """
+
+    def __init__(self, session: Any, keys: Keys, channel: str, cls: type, codec: Codec, max_skew_s: float) -> None:
+        import zenoh
+
+        self.channel, self._cls, self._codec, self._skew_s = channel, cls, codec, max_skew_s
+        self.key = keys.stream(channel, ROS_NAMES[cls])
+        self._subscriber = session.declare_subscriber(self.key, zenoh.handlers.RingChannel(RING))
+        self.counts = StreamCounts()
+        self.offset_ns: int | None = None
+        self.newest_ns = -1
+        self.arrived_ns = -1
+        self._clock = ClockOffset(max_skew_s)
+        self._gid = b""
+        self._sequence = -1
+        self._stamp_ns = -1
+
+    def drain(self, now_ns: int) -> list[Sample]:
+        """Samples that arrived since the last call; now_ns is the time of the tick."""
+        waiting = []
+        for _ in range(RING):
+            raw = self._subscriber.try_recv()
+            if raw is None:
+                break
+            waiting.append(raw)
+        if not waiting:
+            return []
+        # after the last was taken, so that none of them can have come later: decoding may take its time
+        arrival_ns = monotonic_ns()
+        found: list[Sample] = []
+        for raw in waiting:
+            try:
+                sample = self._read(raw, now_ns, arrival_ns)
+            except WireError as e:
+                self.counts.garbage += 1
+                self.counts.last_fault = str(e)
+                continue
+            if sample is not None:
+                found.append(sample)
+        return found
+
+    def _read(self, raw: Any, now_ns: int, arrival_ns: int) -> Sample | None:
+        counts = self.counts
+        if raw.attachment is None:
+            raise WireError("attachment", "missing")
+        attachment = unpack_attachment(raw.attachment.to_bytes())
+        if not self._belongs(attachment.gid, now_ns):
+            counts.foreign += 1
+            counts.last_fault = f"a second sender, {attachment.gid.hex()}, while {self._gid.hex()} sends"
+            return None
+        if len(raw.payload) > MAX_BYTES:
+            raise WireError(self.channel, f"{len(raw.payload)} bytes, at most {MAX_BYTES} are read")
+        message, header_ns = self._codec.decode(self._cls, raw.payload.to_bytes())
+        stamp_ns = attachment.stamp_ns if header_ns is None else header_ns
+        sequence = attachment.sequence
+        if sequence == self._sequence and stamp_ns == self._stamp_ns:
+            counts.repeated += 1
+            return None
+        if self._sequence >= 0 and sequence > self._sequence + 1:
+            counts.gaps += sequence - self._sequence - 1
+        if stamp_ns < self._stamp_ns:
+            counts.backwards += 1
+            counts.last_fault = f"a stamp {(self._stamp_ns - stamp_ns) / 1e6:.1f} ms before the one before it"
+        self._sequence, self._stamp_ns = max(sequence, self._sequence), max(stamp_ns, self._stamp_ns)
+        at_ns = self._clock.take(stamp_ns, arrival_ns)
+        counts.jumps, self.offset_ns = self._clock.jumps, self._clock.offset_ns
+        if at_ns is None:
+            counts.unbelieved += 1
+            counts.last_fault = f"a stamp that its clock's offset does not explain by more than {self._skew_s:g} s"
+            return None
+        counts.samples += 1
+        self.newest_ns, self.arrived_ns = max(at_ns, self.newest_ns), now_ns
+        return Sample(at_ns, self.channel, message, sequence, now_ns)
+
+    def _belongs(self, gid: bytes, now_ns: int) -> bool:
+        """Whether the sample is of the stream's sender; another one takes over when that is silent."""
+        if gid != self._gid:
+            if self._gid and now_ns - self.arrived_ns < SILENT_NS:
+                return False
+            self._gid, self._sequence, self._stamp_ns = gid, -1, -1
+            self._clock = ClockOffset(self._skew_s)
+        return True

@@ -1,0 +1,113 @@
+"""A supervisor in a process of its own beside a robot, over real Zenoh sessions on loopback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from foreshock.messages import GripState
+from foreshock.session.replay import replay
+from foreshock.wire import Codec
+
+sys.path.append(str(Path(__file__).parent))
+from robot import Robot, free_endpoint, supervisor, until
+
+pytest.importorskip("zenoh")
+
+
+def test_lease_interventions_questions_and_an_operator(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        status = until(robot.status, "a status")
+        assert status.motion_permitted
+        assert list(status.streams) == ["robot/left_gripper/state"]
+        assert "g1" in status.guards
+        assert "guard/g1" in status.peers
+        # a late joiner gets everything
+        taxonomy = msgspec.json.decode(robot.ask("taxonomy") or b"")
+        assert {m["code"] for m in taxonomy["modes"]} >= {"A1", "A12"}
+        config = msgspec.json.decode(robot.ask("config") or b"")
+        assert config["supervisor"]["robot"] == "robot"
+        assert robot.ask("history")
+        # the stream ends: unobserved beyond the grace time
+        robot.streaming = False
+        until(lambda: robot.told("minimal-risk") == [1.0], "the minimal risk condition")
+        until(lambda: not robot.guard.permitted(), "the lease ends")
+        assert robot.stops == ["the motion lease has expired"]
+        # it comes back, but stays latched until an operator resets it, with who and why
+        robot.streaming = True
+        until(lambda: (s := robot.status()) and not s.health, "everything is observed again")
+        assert not robot.guard.permitted()
+        assert (robot.ask("reset", b'{"who": "", "why": "x"}') or b"").startswith(b"error")
+        words = [sys.executable, "-m", "foreshock", "reset", "robot", "--who", "jane", "--why", "gripper seen to"]
+        subprocess.run([*words, "--connect", endpoint], check=True, capture_output=True)
+        until(robot.guard.permitted, "the robot may move again")
+        until(lambda: robot.told("minimal-risk")[-1] == 0.0, "the release is told")
+        assert "announce" in {i.action for i in robot.interventions}
+    (journal,) = (tmp_path / "journals").glob("*.mcap")
+    result = replay(journal)
+    assert result.agrees
+    assert result.complete
+    assert "minimal-risk" in result.levels
+
+
+def test_garbage_of_every_kind_is_counted_and_stops_nothing(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    codec = Codec()
+    grip = GripState(True, 20.0, 5.0, 0.05, 20.0, 0.5, 0.0)
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        good = codec.encode(grip, time.time_ns())
+        for payload in (b"", b"\x00", os.urandom(200), good[:20], bytes(1_200_000), b"\x00\x00" + good[2:]):
+            robot.put(payload, robot.attachment(time.time_ns()))
+        robot.put(good, None)
+        robot.put(good, b"short")
+
+        def seen() -> bool:
+            s = robot.status()
+            return s is not None and s.streams["robot/left_gripper/state"].counts.garbage >= 8
+
+        until(seen, "eight payloads are counted as garbage")
+        now_ns = time.time_ns()
+        twice = robot.attachment(now_ns)
+        robot.put(codec.encode(grip, now_ns), twice)
+        robot.put(codec.encode(grip, now_ns), twice)
+        robot.put(codec.encode(grip, now_ns - 1_000_000_000), robot.attachment(now_ns - 1_000_000_000))
+        robot._sequence += 5
+        nan = msgspec.structs.replace(grip, normal_force=float("nan"))
+        robot.put(codec.encode(nan, time.time_ns()), robot.attachment(time.time_ns()))
+
+        def counted() -> bool:
+            s = robot.status()
+            counts = s.streams["robot/left_gripper/state"].counts if s is not None else None
+            return counts is not None and min(counts.repeated, counts.backwards, counts.gaps) >= 1
+
+        until(counted, "repeated, backwards and missing samples are counted")
+        status = robot.status()
+        assert status is not None
+        assert "robot/left_gripper/state" in status.health
+        until(lambda: (s := robot.status()) and s.tick > status.tick + 50, "it ticks on")
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_dead_or_stopped_supervisor_ends_motion_and_another_one_resumes(tmp_path: Path, how: signal.Signals) -> None:
+    endpoint = free_endpoint()
+    with Robot(endpoint) as robot:
+        with supervisor(tmp_path, endpoint) as process:
+            until(robot.guard.permitted, "the robot may move")
+            os.kill(process.pid, how)
+            until(lambda: robot.stops, "the guard ends motion by itself")
+            assert not robot.guard.permitted()
+            os.kill(process.pid, signal.SIGKILL)
+        with supervisor(tmp_path, endpoint):
+            until(robot.guard.permitted, "the robot may move under the next supervisor")
+            status = until(robot.status, "its status")
+            assert status.motion_permitted
