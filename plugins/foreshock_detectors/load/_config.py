@@ -26,6 +26,7 @@ class LoadConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         wrist_full_rad_s: band RMS of full severity (rad/s): the same by half of its weight.
         tilt_noise_rad: standard deviation of the object's measured orientation about one axis (rad).
         tilt_allowance_rad: tilt that is no drift (rad): 2 degrees, the calibration error of hand-eye and grasp pose.
+        tilt_window_s: time constant of the tilt's mean (s): what swings at 1 Hz or faster is halved at least.
         tilt_full_rad: tilt of full severity (rad): 15 degrees, where the weight's share along the pads begins to spill.
         tilt_lag_s: how late an object follows a commanded rotation (s); the allowance grows by the commanded rate
             times this.
@@ -46,6 +47,7 @@ class LoadConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     wrist_full_rad_s: float = 0.4
     tilt_noise_rad: float = 0.004
     tilt_allowance_rad: float = 0.035
+    tilt_window_s: float = 0.25
     tilt_full_rad: float = 0.26
     tilt_lag_s: float = 0.1
     smallest_drift_sigma: float = 1.0

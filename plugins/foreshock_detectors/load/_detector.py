@@ -8,6 +8,7 @@ from foreshock.detector import Inputs
 from foreshock.messages import Imu, Odometry
 from foreshock.records import Indication, SampleRef
 from foreshock_detectors._sequential import severity
+from foreshock_detectors._stamped import Stamped
 from foreshock_detectors.load._config import LoadConfig
 from foreshock_detectors.load._tilt import Tilt
 from foreshock_detectors.load._wrist import Wrist
@@ -24,20 +25,21 @@ class LoadDetector:
 
     def reset(self, seed: int) -> None:  # noqa: ARG002  # nothing here is random
         """Forget everything."""
-        self._wrist, self._tilt = Wrist(self._config), Tilt(self._config)
+        self._wrist, self._tilt, self._commands = Wrist(self._config), Tilt(self._config), Stamped()
 
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:  # noqa: ARG002  # the samples' own time
         """Wrist instability and tilt drift now."""
         latest, new, config = inputs.latest, inputs.new, self._config
         wrist, tilt = self._wrist, self._tilt
-        command = latest["command"].value
-        if not isinstance(command, Odometry):
-            return ()
+        for sample in new.get("command", ()):
+            self._commands.push(sample)
         for sample in new.get("imu", ()):
-            if isinstance(sample.value, Imu):
+            command = self._commands.at(sample.stamp_ns)
+            if isinstance(sample.value, Imu) and isinstance(command, Odometry):
                 wrist.push(sample.stamp_ns, sample.value.angular_velocity, command.angular)
         for sample in new.get("object", ()):
-            if isinstance(sample.value, Odometry):
+            command = self._commands.at(sample.stamp_ns)
+            if isinstance(sample.value, Odometry) and isinstance(command, Odometry):
                 tilt.push(sample.stamp_ns, sample.value, command)
         found = []
         if wrist.ready:

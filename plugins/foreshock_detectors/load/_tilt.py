@@ -51,13 +51,14 @@ def _unit(q: tuple[float, float, float, float]) -> tuple[float, float, float, fl
 
 
 class Tilt:
-    """Four one-sided sums, both ways about x and y, of z = (+-e - allowance) / sd.
+    """Four one-sided sums, both ways about x and y, of z = (+-m - allowance) / sd.
 
-    While the tilt stays within the allowance they alarm less often than Siegmund's run length at exactly the
-    allowance. The allowance grows with the commanded rate of rotation, which an object follows late.
+    m is the error's mean over an exponential window, so that what swings is no drift; sd is that of one sample. As the
+    mean scatters less, and the tilt stays within the allowance, they alarm less often than Siegmund's run length at
+    exactly the allowance. The allowance grows with the commanded rate of rotation, which an object follows late.
 
     Attributes:
-        angle: tilt now (rad).
+        angle: tilt now, of the mean (rad).
         statistic: largest sum, over its threshold.
         malformed: the last orientation was none.
     """
@@ -66,7 +67,7 @@ class Tilt:
         self._config = config
         self._period = RunningMedian(least=1e-6, start=9)
         self._sums: tuple[Cusum, ...] = ()
-        self._dt = 0.0
+        self._dt = self._x = self._y = 0.0
         self._hysteresis = Hysteresis(1.0, 0.5, round(config.hold_s * 1e9))
         self._stamp_ns = -1
         self.angle, self.statistic, self.malformed = 0.0, 0.0, False
@@ -101,7 +102,9 @@ class Tilt:
             self._dt, reference = period.value, 0.5 * config.smallest_drift_sigma
             limit = cusum_threshold(config.false_alarm_s / self._dt, reference)
             self._sums = tuple(Cusum(reference, limit, CLIP) for _ in range(4))
-        x, y = error
+        weight = self._dt / (self._dt + config.tilt_window_s)
+        self._x = x = self._x + weight * (error[0] - self._x)
+        self._y = y = self._y + weight * (error[1] - self._y)
         self.angle = math.hypot(x, y)
         wx, wy, wz = command.angular
         allowance = config.tilt_allowance_rad + config.tilt_lag_s * math.sqrt(wx * wx + wy * wy + wz * wz)

@@ -8,6 +8,7 @@ from foreshock.detector import Inputs
 from foreshock.messages import Humans, Odometry, WrenchStamped
 from foreshock.records import Indication, Sample, SampleRef
 from foreshock_detectors._sequential import Hysteresis, severity
+from foreshock_detectors._stamped import Stamped
 from foreshock_detectors.tool._config import ToolConfig
 from foreshock_detectors.tool._orientation import unsafe
 from foreshock_detectors.tool._stability import Stability
@@ -25,19 +26,23 @@ class ToolDetector:
 
     def reset(self, seed: int) -> None:  # noqa: ARG002  # nothing here is random
         """Forget everything."""
-        self._tip = Tip(self._config)
+        self._tip, self._commands = Tip(self._config), Stamped()
         self._orientation = Hysteresis(1.0, 0.7, round(self._config.hold_s * 1e9))
         self._stability: Stability | None = None
 
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:  # noqa: ARG002  # the samples' own time
         """What is known now of the three kinds."""
         latest, config, tip = inputs.latest, self._config, self._tip
-        seen, command = latest["pose"], latest["command"].value
+        for sample in inputs.new.get("command", ()):
+            self._commands.push(sample)
+        for sample in inputs.new.get("pose", ()):
+            command = self._commands.at(sample.stamp_ns)
+            if isinstance(sample.value, Odometry) and isinstance(command, Odometry):
+                tip.push(sample.stamp_ns, sample.value, command)
+        seen = latest["pose"]
+        command = self._commands.at(seen.stamp_ns)
         if not isinstance(seen.value, Odometry) or not isinstance(command, Odometry):
             return ()
-        for sample in inputs.new.get("pose", ()):
-            if isinstance(sample.value, Odometry):
-                tip.push(sample.stamp_ns, sample.value, command)
         found: list[Indication] = []
         if tip.dt > 0.0:
             full = max(config.tip_full_m, 2.0 * tip.limit)

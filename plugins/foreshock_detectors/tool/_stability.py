@@ -18,7 +18,7 @@ class Stability:
 
     chi-square with 3 n degrees of freedom while the model holds. The threshold is its quantile at one false alarm in
     ``false_alarm_s`` if every sample were a test of its own; overlapping windows make alarms rarer than that. One
-    sample counts at most half the threshold, so that no spike alone raises it.
+    sample counts at most a third of the threshold, so that no two spikes raise it.
 
     Attributes:
         statistic: sum over its threshold.
@@ -28,7 +28,7 @@ class Stability:
         self._config = config
         tail = min(0.5, dt / config.false_alarm_s)
         self._threshold = chi2_quantile(tail, 3 * config.nis_samples)
-        self._most = 0.5 * self._threshold
+        self._most = self._threshold / 3.0
         self._last: deque[float] = deque(maxlen=config.nis_samples)
         self._hysteresis = Hysteresis(1.0, 0.5, round(config.hold_s * 1e9))
         self._stamp_ns = -1

@@ -4,7 +4,7 @@
 #include "body.h"
 #include "model.h"
 
-#define FOOT_DAMPING 150.0 /* N s/m, chosen small */
+#define FOOT_DAMPING 40.0 /* N s/m, chosen small */
 
 /* What has flowed in until t, kg. */
 static double added_at(const double *vars, double t) {
@@ -13,6 +13,17 @@ static double added_at(const double *vars, double t) {
 }
 
 double mass_at(const double *vars, double t) { return vars[V_mass] + added_at(vars, t); }
+
+/* CoM ahead of the pads while level: what flows in lies elsewhere than what was there. */
+static double ahead_at(const double *vars, double t) {
+    const double added = added_at(vars, t);
+    return (vars[V_mass] * vars[V_offset_x] + added * vars[V_fill_offset]) / (vars[V_mass] + added);
+}
+
+double com_rate(const double *vars, double t, const double *x) {
+    const double ahead = cos(x[X_TILT]) * ahead_at(vars, t) + sin(x[X_TILT]) * vars[V_offset_z];
+    return vars[V_wrist_lever] * x[X_WRIST_RATE] - x[X_LOWER_RATE] - x[X_SLIDE_RATE] + ahead * x[X_TILT_RATE];
+}
 
 /* Friction coefficient at a slip speed: Stribeck's fall from static to kinetic, then the strengthening of rubber. */
 static double friction(const double *vars, double speed) {
@@ -30,7 +41,7 @@ static double squared(double x) { return x * x; }
 
 void held_rhs(const Plant *self, const double *vars, double t, const double *x, double *dx, Forces *f) {
     const double added = added_at(vars, t), m = vars[V_mass] + added, lever = vars[V_wrist_lever];
-    const double cx = (vars[V_mass] * vars[V_offset_x] + added * vars[V_fill_offset]) / m, cz = vars[V_offset_z];
+    const double cx = ahead_at(vars, t), cz = vars[V_offset_z];
     const double c = cos(x[X_TILT]), s = sin(x[X_TILT]), rate = x[X_TILT_RATE];
     const double lx = c * cx + s * cz, lz = c * cz - s * cx; /* CoM ahead of and below the pads */
     const double k = vars[V_pad_stiffness], d = vars[V_pad_damping], r2 = squared(vars[V_pad_radius]);

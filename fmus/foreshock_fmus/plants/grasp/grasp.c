@@ -23,7 +23,7 @@ static long long steps_in(const double *vars, double time_s) {
 static double now(const Plant *self, const double *vars) { return (double)self->step * vars[V_dt]; }
 
 static void publish(Plant *self, double *vars) {
-    const double *x = self->x, t = now(self, vars), lever = vars[V_wrist_lever];
+    const double *x = self->x, t = now(self, vars);
     double dx[X_SIZE];
     Forces f = {0};
     held_rhs(self, vars, t, x, dx, &f);
@@ -42,7 +42,7 @@ static void publish(Plant *self, double *vars) {
     vars[V_wrist_angle] = x[X_WRIST];
     vars[V_wrist_rate] = x[X_WRIST_RATE];
     vars[V_tilt] = x[X_TILT];
-    vars[V_com_rate] = held ? lever * x[X_WRIST_RATE] - x[X_LOWER_RATE] - x[X_SLIDE_RATE] + vars[V_offset_x] * x[X_TILT_RATE] : self->fall_rate;
+    vars[V_com_rate] = held ? com_rate(vars, t, x) : self->fall_rate;
     vars[V_support_force] = f.support;
     vars[V_hand_acceleration] = self->hand;
     vars[V_heat] = x[X_HEAT];

@@ -51,6 +51,7 @@ struct Plant {
 
 /* dynamics.c */
 double mass_at(const double *vars, double t);
+double com_rate(const double *vars, double t, const double *x); /* upwards, less the hand's by walking */
 void held_rhs(const Plant *self, const double *vars, double t, const double *x, double *dx, Forces *f);
 void return_mapping(Plant *self, const double *vars);
 double falling_force(const Plant *self, const double *vars);

@@ -6,6 +6,7 @@
 #define PI 3.141592653589793
 #define TREMOR_TIME 0.02 /* s */
 #define ARM_TIME 0.04    /* s, of the arm's speed loop */
+#define STOP_TIME 0.01   /* s, of the arm once the load stands */
 #define BUMP_WIDTH 0.15  /* s */
 
 static double half_sine(double t, double width) { return t >= 0.0 && t < width ? sin(PI * t / width) : 0.0; }
@@ -43,7 +44,7 @@ void control_tick(Plant *self, const double *vars, double t) {
     const double left = vars[V_support_below] + 0.004 - x[X_LOWERED], most = vars[V_lower_acceleration];
     const double brake = left > 0.0 ? sqrt(2.0 * 0.7 * most * left) : 0.0;
     const double speed = fmin(vars[V_lower_speed] * self->act[ACT_LOWER], brake);
-    const double lower_acc = self->landed ? -x[X_LOWER_RATE] / TICK : clip((speed - x[X_LOWER_RATE]) / ARM_TIME, most);
+    const double lower_acc = self->landed ? -x[X_LOWER_RATE] / STOP_TIME : clip((speed - x[X_LOWER_RATE]) / ARM_TIME, most);
     x[X_LOWER_RATE] += TICK * lower_acc;
     self->hand = hand_acceleration(self, vars, t) - lower_acc;
 
