@@ -75,6 +75,17 @@ def test_a_person_who_vanishes_in_view_is_occluded_and_one_who_walks_out_is_not(
     assert present(played(frames([out], 6.0), config)) == {}
 
 
+def test_a_person_who_changed_course_behind_a_pillar_is_the_same_when_seen_again() -> None:
+    """Walks at 1 m/s into it, stops there for 1.5 s unseen, and comes back out 1.5 m off the predicted place."""
+    walker = named("p1", "human", y=lambda t: min(t, 2.0) - 1.0, there=lambda t: not 2.0 <= t < 3.5)
+    said = played(frames([walker], 5.0))
+    assert present(said).keys() == {"visual-occlusion"}
+    mine = [i for t, i in said if i.kind == "visual-occlusion" and i.subject == "p1"]
+    assert not mine[-1].present
+    stamps = {i.stamp_ns for i in mine}
+    assert stamps >= {i.stamp_ns for _, i in said if i.stamp_ns > 1_000_000_000}  # spoken of without a gap
+
+
 def test_a_ghost_of_a_few_frames_is_nobody_who_could_be_hidden() -> None:
     ghost = named("g", "human", there=lambda t: 2.0 <= t < 2.2)
     assert present(played(frames([named("p1", "human", x=always(4.0)), ghost], 5.0))) == {}

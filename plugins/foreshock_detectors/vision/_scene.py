@@ -10,11 +10,15 @@ from foreshock_detectors.vision._track import Track
 
 __all__ = ["Scene"]
 
+WALK_M_S = 1.6
+"""Walking speed of ISO 13855: by so much an id may be off its predicted place per second in which it was not seen."""
+
 
 class Scene:
     """Follows the tracks frame by frame.
 
-    A detection belongs to the track of its id if it lies within the gate of where that is predicted. Another one takes
+    A detection belongs to the track of its id if it lies within the gate of where that is predicted, a gate that widens
+    while the track is unseen: whoever steps out from behind a rack has changed course there. Another detection takes
     over the nearest track within the gate that has no detection of its own: the id has switched. What is left over
     begins a track.
 
@@ -42,7 +46,8 @@ class Scene:
         unseen: list[Track] = []
         for track in self.tracks:
             own = found.get(track.id)
-            if own is not None and track.distance(own, stamp_ns) <= config.gate_m:
+            gate = config.gate_m + WALK_M_S * 1e-9 * (stamp_ns - track.seen_ns)
+            if own is not None and track.distance(own, stamp_ns) <= gate:
                 del found[track.id]
                 track.push(own, stamp_ns, config)
             else:
