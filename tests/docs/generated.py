@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata as md
 import sys
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import msgspec
 
 from foreshock.cli import cli
 from foreshock.config import config_schema
+from foreshock.hookspecs import GROUP
 from foreshock.registry import Registry
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
@@ -36,8 +38,9 @@ def cli_page() -> str:
 def schema() -> str:
     """JSON schema of a configuration with the first-party plugins only, whatever else is installed."""
     registry = Registry()
-    for name in ("balance", "grip", "proximity", "telemetry", "ladder", "paper-gate"):
-        registry.load(name)
+    for point in md.entry_points(group=GROUP):
+        if point.value.startswith("foreshock_detectors."):
+            registry.load(point.name)
     full = config_schema(registry.detectors(), registry.policies())
     return msgspec.json.format(msgspec.json.encode(full, order="sorted"), indent=2).decode() + "\n"
 
