@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 __all__ = ["DEFAULT_ENDPOINT", "AccessRule", "LinkSettings", "TlsSettings", "keys_of", "open_link"]
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+OWN = ("lease", "intervention", "decision")
+"""Services that only the supervisor writes."""
 LOOPBACK = ("127.", "localhost", "[::1]", "::1")
 
 
@@ -173,14 +175,17 @@ def _file(base: Path, place: str, name: str) -> str:
 def _access(rules: tuple[AccessRule, ...]) -> dict[str, Any]:
     """Zenoh's access control: denied by default; everybody may read; writing and asking by name."""
     reading = ["declare_subscriber", "liveliness_query", "declare_liveliness_subscriber", "reply", "declare_queryable"]
+    # a denial outweighs any permission; the supervisor's own session does not come in over a link
+    own = {**_rule("own", ["put", "delete"], [f"foreshock/*/_/{s}" for s in OWN], ["ingress"]), "permission": "deny"}
     out: list[dict[str, Any]] = [
+        own,
         _rule("read", reading, ["**"], ["ingress", "egress"]),
         # what may come in may go on to everybody: the check is where it enters
         _rule("deliver", ["put", "delete", "query", "liveliness_token"], ["**"], ["egress"]),
     ]
     subjects, policies = [], []
     for k, rule in enumerate(rules):
-        mine = ["read", "deliver"]
+        mine = ["own", "read", "deliver"]
         if rule.write:
             out.append(_rule(f"write-{k}", ["put", "delete", "liveliness_token"], list(rule.write), ["ingress"]))
             mine.append(f"write-{k}")

@@ -24,6 +24,7 @@ from foreshock.cli.policies_cmd import policies
 from foreshock.cli.replay_cmd import replay
 from foreshock.cli.run_cmd import run
 from foreshock.cli.scenarios_cmd import scenarios
+from foreshock.cli.security_cmd import security
 from foreshock.cli.sensitivity_cmd import sensitivity
 from foreshock.cli.simulate_cmd import simulate
 from foreshock.cli.taxonomy_cmd import taxonomy
@@ -73,8 +74,8 @@ def cli() -> None:
 
 
 COMMANDS = (
-    calibrate, config, demo, detectors, events, gates, journal, policies, replay, reset, run, scenarios, sensitivity,
-    simulate, taxonomy, top, twin,
+    calibrate, config, demo, detectors, events, gates, journal, policies, replay, reset, run, scenarios, security,
+    sensitivity, simulate, taxonomy, top, twin,
 )  # fmt: skip
 for command in COMMANDS:
     cli.add_command(command)

@@ -2,6 +2,7 @@
 
 from foreshock.live._config import RunConfig, load_run, parse_run
 from foreshock.live._run import LiveSupervisor
+from foreshock.live._security import access_rules, init_security
 from foreshock.live._serve import FreeRunning, SteppedServer
 from foreshock.live._services import ResetRequest
 from foreshock.live._settings import JournalSettings, LiveSettings
@@ -16,6 +17,8 @@ __all__ = [
     "RunConfig",
     "Status",
     "SteppedServer",
+    "access_rules",
+    "init_security",
     "load_run",
     "parse_run",
 ]

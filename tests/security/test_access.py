@@ -1,0 +1,161 @@
+"""Without the right certificate nothing can be published that the supervisor or the guard acts on."""
+
+from __future__ import annotations
+
+import sys
+import time
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "live"))
+from robot import free_endpoint, supervisor, until
+
+from foreshock.errors import BadInputError
+from foreshock.guard import Guard
+from foreshock.guard._cdr import Numbered, Request, pack_intervention, pack_lease, pack_request
+from foreshock.link import LinkSettings, TlsSettings, open_link
+from foreshock.live import Status, init_security
+from foreshock.messages import GripState
+from foreshock.records import Intervention, Lease
+from foreshock.wire import Codec, Keys, pack_attachment
+
+pytest.importorskip("zenoh")
+KEYS = Keys("robot")
+CONFIG = """
+[supervisor]
+robot = "robot"
+period_s = 0.01
+[[detectors]]
+use = "grip"
+[live]
+ttl_s = 0.3
+"""
+
+
+class Plant:
+    """A supervisor with access rules, and how others reach it."""
+
+    def __init__(self, folder: Path, endpoint: str) -> None:
+        self.folder, self.endpoint = folder, endpoint
+
+    def link(self, name: str, ca: str = "ca.pem", folder: Path | None = None) -> LinkSettings:
+        at = folder or self.folder
+        tls = TlsSettings(str(at / ca), str(at / f"{name}.pem"), str(at / f"{name}.key.pem"))
+        return LinkSettings("client", (), (self.endpoint,), tls=tls)
+
+    def open(self, name: str) -> Any:
+        return until(lambda: _opened(self.link(name)), f"{name} joins")
+
+    def status(self, session: Any) -> Status | None:
+        for reply in session.get(KEYS.service("status"), timeout=3.0):
+            if reply.ok is not None:
+                return msgspec.json.decode(reply.ok.payload.to_bytes(), type=Status)
+        return None
+
+
+def _opened(link: LinkSettings) -> Any:
+    try:
+        return open_link(link)
+    except BadInputError:
+        return None
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
+    folder = tmp_path_factory.mktemp("certificates") / "here"
+    init_security(folder, "robot", {"scene": ["humans/pose"]})
+    endpoint = free_endpoint().replace("tcp/", "tls/")
+    link = tomllib.loads((folder / "link.toml").read_text())["link"]
+    text = (folder / "link.toml").read_text().replace(link["listen"][0], endpoint).replace("{", "{{").replace("}", "}}")
+    with supervisor(folder, endpoint, CONFIG + text):
+        yield Plant(folder, endpoint)
+
+
+def stream(session: Any, k: int) -> None:
+    """One sample of the gripper."""
+    stamp_ns = time.time_ns()
+    payload = Codec().encode(GripState(True, 20.0, 5.0, 0.05, 20.0, 0.5, 0.0), stamp_ns)
+    key = KEYS.stream("robot/left_gripper/state", "foreshock_msgs/msg/GripState")
+    session.put(key, payload, attachment=pack_attachment(k, stamp_ns, b"0123456789abcdef"))
+
+
+def samples(plant: Plant, session: Any) -> int:
+    status = plant.status(session)
+    assert status is not None
+    return status.streams["robot/left_gripper/state"].counts.samples
+
+
+def test_only_the_robot_writes_its_streams(plant: Plant) -> None:
+    with plant.open("viewer") as viewer, plant.open("scene") as scene, plant.open("robot") as robot:
+        until(lambda: plant.status(viewer), "a viewer may ask")
+        before = samples(plant, viewer)
+        for k in range(20):
+            stream(scene, k)  # a twin, whose channel this is not
+            stream(viewer, k)
+        time.sleep(0.3)
+        assert samples(plant, viewer) == before
+        for k in range(20):
+            stream(robot, 1000 + k)
+        until(lambda: samples(plant, viewer) > before, "the robot's samples arrive")
+
+
+def test_nobody_but_the_supervisor_tells_a_guard_anything(plant: Plant) -> None:
+    told: list[Intervention] = []
+    guard = Guard("robot", lambda i: told.append(i) is None, lambda _: None, plant.link("robot"), "g1")
+    with plant.open("scene") as scene, plant.open("robot") as robot, plant.open("operator") as operator, guard:
+        time.sleep(0.3)
+        forged = pack_intervention(Numbered(2**62, 1, Intervention(0, "forged", 1.0)))
+        for session in (scene, robot, operator):
+            session.put(KEYS.service("intervention"), forged)
+            # the guard's next requests are 1, 2, 3, ...: a lease that would match one of them by luck
+            for nonce in range(200):
+                session.put(KEYS.service("lease"), pack_lease(Lease(2**62, nonce, nonce, 10**9)))
+        time.sleep(0.5)
+        assert "forged" not in {i.action for i in told}
+        assert guard.counts.refused == 0
+        assert guard.counts.fenced == 0
+
+
+def test_only_an_operator_resets(plant: Plant) -> None:
+    payload = b'{"who": "jane", "why": "looked at it"}'
+    for name, may in (("viewer", False), ("scene", False), ("robot", False), ("operator", True)):
+        with plant.open(name) as session:
+            until(lambda s=session: plant.status(s), f"{name} may ask for the status")
+            replies = [r.ok for r in session.get(KEYS.service("reset"), payload=payload, timeout=2.0)]
+            assert bool([r for r in replies if r is not None]) is may, name
+
+
+def test_a_foreign_authority_and_no_certificate_are_refused(plant: Plant, tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign"
+    init_security(foreign, "robot", {"scene": ["humans/pose"]})
+    # a certificate of the right name by the wrong authority, whether or not it trusts ours
+    (foreign / "ours.pem").write_bytes((plant.folder / "ca.pem").read_bytes())
+    for link in (plant.link("robot", folder=foreign), plant.link("robot", "ours.pem", foreign)):
+        session = _opened(link)
+        if session is not None:
+            with session:
+                assert plant.status(session) is None
+    plain = LinkSettings("client", (), (plant.endpoint.replace("tls/", "tcp/"),))
+    assert _opened(plain) is None
+    with plant.open("viewer") as viewer:
+        assert plant.status(viewer) is not None
+
+
+def test_a_request_for_a_lease_needs_the_robots_certificate(plant: Plant) -> None:
+    with plant.open("scene") as scene, plant.open("viewer") as viewer:
+        for session in (scene, viewer):
+            session.put(KEYS.service("lease_request"), pack_request(Request("intruder", 1, 1)))
+        time.sleep(0.3)
+        status = until(lambda: plant.status(viewer), "status")
+        assert "intruder" not in status.guards
+
+
+def test_what_lies_in_the_folder_is_never_overwritten(plant: Plant) -> None:
+    with pytest.raises(BadInputError, match="never overwritten"):
+        init_security(plant.folder, "robot", {})
+    assert (plant.folder / "robot.key.pem").stat().st_mode & 0o077 == 0
