@@ -37,6 +37,9 @@ def test_lease_interventions_questions_and_an_operator(tmp_path: Path) -> None:
         config = msgspec.json.decode(robot.ask("config") or b"")
         assert config["supervisor"]["robot"] == "robot"
         assert robot.ask("history")
+        words = [sys.executable, "-m", "foreshock", "doctor", str(tmp_path / "run.toml"), "--json"]
+        found = msgspec.json.decode(subprocess.run(words, check=True, capture_output=True).stdout)["result"]
+        assert {f["what"]: f["fine"] for f in found}["robot/left_gripper/state"] is True
         # the stream ends: unobserved beyond the grace time
         robot.streaming = False
         until(lambda: robot.told("minimal-risk") == [1.0], "the minimal risk condition")

@@ -15,6 +15,7 @@ from foreshock.cli.calibrate_cmd import calibrate
 from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
+from foreshock.cli.doctor_cmd import doctor
 from foreshock.cli.events_cmd import events
 from foreshock.cli.gates_cmd import gates
 from foreshock.cli.journal_cmd import journal
@@ -74,8 +75,8 @@ def cli() -> None:
 
 
 COMMANDS = (
-    calibrate, config, demo, detectors, events, gates, journal, policies, replay, reset, run, scenarios, security,
-    sensitivity, simulate, taxonomy, top, twin,
+    calibrate, config, demo, detectors, doctor, events, gates, journal, policies, replay, reset, run, scenarios,
+    security, sensitivity, simulate, taxonomy, top, twin,
 )  # fmt: skip
 for command in COMMANDS:
     cli.add_command(command)

@@ -89,6 +89,7 @@ def view(s: Status) -> Group:
     now.add_row("not acknowledged", ", ".join(s.unacknowledged) or "none")
     now.add_row("guards", "\n".join(f"{g} {age:.2f} s ago" for g, age in s.guards.items()) or "none")
     now.add_row("peers", "\n".join(s.peers) or "none")
+    now.add_row("links", "\n".join(s.links) or "none")
     streams = _grid("channel", "source age", "arrival", "samples", "gaps", "garbage", "foreign", "fault")
     for name, x in s.streams.items():
         c = x.counts

@@ -181,6 +181,9 @@ class LiveSupervisor:
             streams={s.channel: stream_status(s, now_ns) for s in self._streams},
             health={**faults, **self._health},
             peers=self._services.peers(),
+            links=tuple(
+                sorted(f"{x.dst} {x.auth_identifier or 'without a certificate'}" for x in self._session.info.links())
+            ),
             journal="" if self._journal is None else str(self._journal.path),
         )
 

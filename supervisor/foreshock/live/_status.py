@@ -47,6 +47,7 @@ class Status(msgspec.Struct, frozen=True):
         streams: by channel.
         health: of detectors and channels that are not ok, with the reason.
         peers: liveliness tokens that are up.
+        links: processes that are connected: address, and the name in the certificate where there is one.
         journal: file that is written, or empty.
     """
 
@@ -72,6 +73,7 @@ class Status(msgspec.Struct, frozen=True):
     streams: dict[str, StreamStatus]
     health: dict[str, str]
     peers: tuple[str, ...]
+    links: tuple[str, ...]
     journal: str
 
 
