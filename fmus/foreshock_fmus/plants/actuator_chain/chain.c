@@ -73,7 +73,7 @@ void chain_rhs(const Plant *self, const double *vars, const double x[X_SIZE], do
     const double resistance = vars[V_winding_resistance] * (1.0 + 0.0039 * (x[X_HEAT] - 25.0)), loss = i * i * resistance;
     const double volts = x[X_VOLTS] > 5.0 ? x[X_VOLTS] : 5.0, shaft = drive * wm;
     const double rest = vars[V_rest_current] * (1.0 - vars[V_derate_rest] * self->derate) * (1.0 - vars[V_stop_rest] * self->stop);
-    const double open = supply_volts(vars, (double)self->step * vars[V_dt]);
+    const double open = supply_volts(vars, ((double)self->step + 0.5) * vars[V_dt]); /* held over a step: its middle */
     dx[X_VOLTS] = ((open - x[X_VOLTS]) / vars[V_supply_resistance] - rest - (loss + (shaft > 0.0 ? shaft : 0.0)) / volts) / vars[V_bus_capacity];
     dx[X_HEAT] = (loss - (x[X_HEAT] - vars[V_ambient]) / vars[V_thermal_resistance]) / vars[V_heat_capacity];
 }
