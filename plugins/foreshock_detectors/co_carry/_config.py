@@ -31,7 +31,7 @@ class CoCarryConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         desync_rad: lag between the swings of grip force and load. Beyond pi / 3 less than half of the load's swing,
             cos(lag), is answered by the grip.
         low_hz: lower edge of the band of a gait (Hz): below it the load is moved on purpose.
-        high_hz: upper edge (Hz); people step at up to 2.5 Hz (Winter, 1991).
+        high_hz: upper edge (Hz); people step at 1.4 to 2.1 Hz (slow to fast cadence, Winter, 1991).
         phase_time_constant_s: of the averages that the lag comes from (s): half a step; the lag of
             two pure sines then ripples by up to asin(1 / (2 w tau)), 0.17 rad at 1.8 Hz.
         least_coherence: two swings of less coherence have no common rhythm, and so no lag. It does not keep noise out,
