@@ -1,7 +1,7 @@
 """Journals in MCAP files: a killed process loses nothing that was flushed; what is there replays exactly."""
 
 from foreshock.recording._format import DECISION, RESET, TICK, Head, TickRecord
-from foreshock.recording._read import JournalFile, Tick, records_of
+from foreshock.recording._read import JournalFile, Tick, is_journal, records_of
 from foreshock.recording._recover import Summary, recover, summary
 from foreshock.recording._write import McapJournal
 
@@ -15,6 +15,7 @@ __all__ = [
     "Summary",
     "Tick",
     "TickRecord",
+    "is_journal",
     "records_of",
     "recover",
     "summary",

@@ -15,7 +15,7 @@ from foreshock.recording._format import DECISION, HEAD, RESET, TICK, Head, TickR
 from foreshock.records import Sample
 from foreshock.wire import BY_ROS, Codec
 
-__all__ = ["JournalFile", "Tick", "records_of"]
+__all__ = ["JournalFile", "Tick", "is_journal", "records_of"]
 
 
 class Tick(msgspec.Struct, frozen=True):
@@ -47,6 +47,8 @@ def records_of(path: Path) -> Iterator[Any]:
     except ImportError as e:
         hint = "; run: pip install 'foreshock[zenoh]'"
         raise MissingExtraError("journal", f"{e.name} is not installed", hint) from e
+    if not path.is_file():
+        raise BadInputError(str(path), "is no file")
     with path.open("rb") as file:
         reader = StreamReader(file, validate_crcs=True)
         count = 0
@@ -61,6 +63,21 @@ def records_of(path: Path) -> Iterator[Any]:
             raise BadInputError(
                 str(path), f"is no MCAP file, or damaged after record {count}: {type(e).__name__}: {e}"
             ) from None
+
+
+def is_journal(path: Path) -> bool:
+    """Whether a file is a journal of Foreshock."""
+    try:
+        JournalFile(path)
+    except BadInputError:
+        # one that cannot be read at all is told of by whoever opens it as a journal: it is no folder and no bag
+        return path.is_file() and path.suffix == ".mcap" and not _is_mcap(path)
+    return True
+
+
+def _is_mcap(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(8) == b"\x89MCAP0\r\n"
 
 
 class JournalFile:

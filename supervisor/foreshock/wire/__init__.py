@@ -14,7 +14,8 @@ from foreshock.wire._lockstep import (
     pack_samples,
     unpack_samples,
 )
-from foreshock.wire._ros import BY_ROS, ROS_NAMES
+from foreshock.wire._ros import BY_ROS, ROS_NAMES, stamp_of
+from foreshock.wire._ros import from_ros as message_of
 from foreshock.wire._types import definitions, rihs01, ros_type, typestore
 
 __all__ = [
@@ -39,10 +40,12 @@ __all__ = [
     "encode_reference",
     "encode_ros",
     "liveliness_token",
+    "message_of",
     "pack_attachment",
     "pack_samples",
     "rihs01",
     "ros_type",
+    "stamp_of",
     "typestore",
     "unpack_attachment",
     "unpack_samples",
