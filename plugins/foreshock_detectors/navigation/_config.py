@@ -61,8 +61,8 @@ class NavigationConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         path_max_age_s: age at which the plan is (s).
 
     The false alarm rate of convergence follows from its CUSUM. Of the other three kinds there is none by theory, since
-    they judge what people do: 180 nominal runs of the plants gait_swing and crossing, 3 h, raised none, which bounds the
-    rate at 1 per hour (95 %, Poisson).
+    they judge what people do: 180 nominal runs of the plants gait_swing and crossing, 3 h, raised none, which bounds
+    the rate at 1 per hour (95 %, Poisson).
     """
 
     robot_radius_m: float = 0.3
