@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from foreshock.messages import Capsule, HumanPose, Odometry, Vec3
+from foreshock.messages import HumanPose, Odometry, Vec3
 from foreshock_detectors.recovery._config import RecoveryConfig
 
 __all__ = ["distance_to", "protective_separation"]
@@ -12,18 +12,21 @@ __all__ = ["distance_to", "protective_separation"]
 
 def distance_to(point: Vec3, human: HumanPose) -> float:
     """From a point to the surface of the nearest capsule (m); negative inside."""
-    return min([_to_capsule(point, capsule) for capsule in human.capsules], default=math.inf)
-
-
-def _to_capsule(p: Vec3, capsule: Capsule) -> float:
-    (ax, ay, az), (bx, by, bz) = capsule.a, capsule.b
-    ux, uy, uz = bx - ax, by - ay, bz - az
-    wx, wy, wz = p[0] - ax, p[1] - ay, p[2] - az
-    square = ux * ux + uy * uy + uz * uz
-    share = (wx * ux + wy * uy + wz * uz) / square if square > 0.0 else 0.0
-    share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
-    dx, dy, dz = wx - share * ux, wy - share * uy, wz - share * uz
-    return math.sqrt(dx * dx + dy * dy + dz * dz) - capsule.radius
+    px, py, pz = point
+    nearest = math.inf
+    for capsule in human.capsules:
+        ax, ay, az = capsule.a
+        bx, by, bz = capsule.b
+        ux, uy, uz, dx, dy, dz = bx - ax, by - ay, bz - az, px - ax, py - ay, pz - az
+        along = dx * ux + dy * uy + dz * uz
+        if along > 0.0:
+            square = ux * ux + uy * uy + uz * uz
+            share = along / square if along < square else 1.0
+            dx, dy, dz = dx - share * ux, dy - share * uy, dz - share * uz
+        separation = math.sqrt(dx * dx + dy * dy + dz * dz) - capsule.radius
+        if separation < nearest:
+            nearest = separation
+    return nearest
 
 
 def protective_separation(config: RecoveryConfig, hand: Odometry, human: HumanPose) -> float:
