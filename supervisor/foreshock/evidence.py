@@ -58,7 +58,9 @@ class Track(msgspec.Struct, frozen=True, gc=False):
         stretches: (source stamp of the onset, end) of stretches of presence that still count; the last ends at last_ns.
         occurrences_ns: occurrences that still count.
         last_ns: when it was last present.
-        peaks: (first, last, severity) of stretches of presence, for the window's maximum.
+        peaks: (first, last, severity) of stretches of presence, each less severe than the one before: the first is the
+            window's maximum. The last ends at last_ns.
+        due_ns: before this, nothing recurs, expires or needs a new peak while it stays present and gets no worse.
         stopped_ns: how long the clock has stood still in all.
         frozen_ns: since when it stands still, -1 if it runs.
         seen: the last indication.
@@ -70,6 +72,7 @@ class Track(msgspec.Struct, frozen=True, gc=False):
     occurrences_ns: tuple[int, ...]
     last_ns: int
     peaks: tuple[tuple[int, int, float], ...]
+    due_ns: int
     stopped_ns: int
     frozen_ns: int
     seen: Indication
@@ -107,46 +110,46 @@ def step(
     """
     span = round(window.length_s * 1e9) * (5 if window.kernel == "exponential" else 1)
     recur = round((window.recurrence_s or window.length_s) * 1e9)
-    lost = frozenset(frozen)
     before = evidence.tracks
-    tracks: dict[Key, Track] = {}
-    fresh: set[Key] = set()
-    for key, seen in observed.items():
-        old = before.get(key)
-        if old is None:
-            if not seen.present:
-                continue
-            fresh.add(key)
-            stamp = min(seen.stamp_ns, now_ns)
-            peak = ((stamp, now_ns, seen.severity),)
-            tracks[key] = Track(True, stamp, ((stamp, now_ns),), (stamp,), now_ns, peak, 0, -1, seen)
-            continue
-        if old.frozen_ns >= 0:
-            old = _thaw(old, now_ns)
-        local = now_ns - old.stopped_ns
-        if seen.present:
-            if not old.present:
-                fresh.add(key)
-            tracks[key] = _present(old, seen, local, recur)
-        else:
-            tracks[key] = msgspec.structs.replace(old, present=False, seen=seen)
-    if not before.keys() <= tracks.keys():
-        for key, old in before.items():
-            if key in tracks:
-                continue
-            if key[2] not in lost and carried is not None and key in carried:
-                local = now_ns - old.stopped_ns
-                tracks[key] = _present(old, old.seen, local, recur) if old.present and old.frozen_ns < 0 else old
-            elif old.frozen_ns < 0:
-                tracks[key] = msgspec.structs.replace(old, frozen_ns=now_ns)
-            else:
-                tracks[key] = old
-    if not tracks:
+    begun = [key for key, seen in observed.items() if seen.present and key not in before]
+    if not begun and not before:
         return NOTHING, ()
-    # sorted by key: most ticks have the keys of the last, which are
-    order: Iterable[Key] = before if tracks.keys() == before.keys() else sorted(tracks)
-    kept = {key: t for key in order if (t := _expire(tracks[key], now_ns, span)) is not None}
-    return Evidence(kept), _merge(kept, window, now_ns, fresh)
+    lost = frozenset(frozen)
+    tracks: dict[Key, Track] = {}
+    fresh = set(begun)
+    for key, track in before.items():
+        seen, running = observed.get(key), track.frozen_ns < 0
+        if seen is None and running and carried is not None and key in carried and key[2] not in lost:
+            seen = track.seen
+        if seen is None:
+            if running:
+                track = msgspec.structs.replace(track, frozen_ns=now_ns)
+        else:
+            if not running:
+                track = _thaw(track, now_ns)
+            local = now_ns - track.stopped_ns
+            if not seen.present:
+                track = msgspec.structs.replace(track, present=False, seen=seen)
+            elif track.present and local < track.due_ns and seen.severity <= track.peaks[-1][2]:
+                tracks[key] = msgspec.structs.replace(track, last_ns=local, seen=seen)
+                continue
+            else:
+                if not track.present:
+                    fresh.add(key)
+                track = _present(track, seen, local, recur, span)
+        kept = _expire(track, now_ns, span)
+        if kept is not None:
+            tracks[key] = kept
+    if begun:
+        tracks |= {key: _begun(observed[key], now_ns) for key in begun}
+        tracks = {key: tracks[key] for key in sorted(tracks)}
+    return Evidence(tracks), _merge(tracks, window, now_ns, fresh)
+
+
+def _begun(seen: Indication, now_ns: int) -> Track:
+    stamp = min(seen.stamp_ns, now_ns)
+    peak = (stamp, now_ns, seen.severity)
+    return Track(True, stamp, ((stamp, now_ns),), (stamp,), now_ns, (peak,), 0, 0, -1, seen)
 
 
 def _thaw(track: Track, now_ns: int) -> Track:
@@ -154,10 +157,7 @@ def _thaw(track: Track, now_ns: int) -> Track:
     return msgspec.structs.replace(track, stopped_ns=stopped, frozen_ns=-1)
 
 
-NO_PEAK = (-(1 << 62), 0, 0.0)
-
-
-def _present(old: Track, seen: Indication, local_ns: int, recur_ns: int) -> Track:
+def _present(old: Track, seen: Indication, local_ns: int, recur_ns: int, span_ns: int) -> Track:
     occurrences, onset, stretches = old.occurrences_ns, old.onset_ns, old.stretches
     if not old.present:
         onset = min(seen.stamp_ns - old.stopped_ns, local_ns)
@@ -169,16 +169,20 @@ def _present(old: Track, seen: Indication, local_ns: int, recur_ns: int) -> Trac
         while newest + recur_ns <= local_ns:
             newest += recur_ns
             occurrences = (*occurrences, newest)
-    peaks, severity = old.peaks, seen.severity
-    first, _, peak = peaks[-1] if peaks else NO_PEAK
-    if local_ns - first < BUCKET_NS:
-        last = (first, local_ns, severity if severity > peak else peak)
-        peaks = (last,) if len(peaks) == 1 else (*peaks[:-1], last)
-    else:
-        while peaks and peaks[-1][2] <= severity:
-            peaks = peaks[:-1]
-        peaks = (*peaks, (local_ns, local_ns, severity))
-    return Track(True, onset, stretches, occurrences, local_ns, peaks, old.stopped_ns, -1, seen)
+    peaks, severity, first = old.peaks, seen.severity, local_ns
+    if peaks:
+        begun, _, peak = peaks[-1]
+        if local_ns - begun >= BUCKET_NS:
+            peaks = (*peaks[:-1], (begun, old.last_ns, peak))
+        else:
+            first, severity, peaks = begun, severity if severity > peak else peak, peaks[:-1]
+    while peaks and peaks[-1][2] <= severity:
+        peaks = peaks[:-1]
+    peaks = (*peaks, (first, local_ns, severity))
+    oldest = [*occurrences[:1], peaks[0][1], *[end for _, end in stretches[:-1]]]
+    newest = occurrences[-1] if occurrences else onset
+    due = min(first + BUCKET_NS, newest + recur_ns, min(oldest) + span_ns)
+    return Track(True, onset, stretches, occurrences, local_ns, peaks, due, old.stopped_ns, -1, seen)
 
 
 def _expire(track: Track, now_ns: int, span_ns: int) -> Track | None:
@@ -190,12 +194,12 @@ def _expire(track: Track, now_ns: int, span_ns: int) -> Track | None:
     occurrences, peaks, stretches = track.occurrences_ns, track.peaks, track.stretches
     if (
         (not occurrences or occurrences[0] > horizon)
-        and (not peaks or peaks[0][1] > horizon)
+        and (not peaks or (peaks[0][1] if len(peaks) > 1 else track.last_ns) > horizon)
         and (len(stretches) == 1 or stretches[0][1] > horizon)
     ):
         return track
     occurrences = tuple(t for t in occurrences if t > horizon)
-    peaks = tuple(p for p in peaks if p[1] > horizon)
+    peaks = tuple(p for p in peaks[:-1] if p[1] > horizon) + (peaks[-1:] if track.last_ns > horizon else ())
     stretches = tuple(s for s in stretches[:-1] if s[1] > horizon) + stretches[-1:]
     return msgspec.structs.replace(track, occurrences_ns=occurrences, peaks=peaks, stretches=stretches)
 
@@ -209,7 +213,7 @@ def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[
         now_ns: time of the tick.
         fresh: keys whose onset is in this tick.
     """
-    found: dict[tuple[str, str], Precursor] = {}
+    found: list[Precursor] = []
     boxcar, tau = window.kernel == "boxcar", window.length_s * 1e9
     for key, track in tracks.items():
         kind, subject, detector = key
@@ -220,14 +224,13 @@ def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[
             local = (track.frozen_ns if frozen else now_ns) - track.stopped_ns
             weight = 1.0 if track.present else math.exp((track.last_ns - local) / tau)
             q = max(weight, math.fsum([math.exp((t - local) / tau) for t in track.occurrences_ns]))
-        phase: Phase = "onset" if key in fresh else "ongoing" if track.present else "cleared"
-        peak = peaks[0][2] if len(peaks) == 1 else max([p[2] for p in peaks], default=seen.severity)
+        phase: Phase = "onset" if fresh and key in fresh else "ongoing" if track.present else "cleared"
         onsets = (stretches[0][0],) if len(stretches) == 1 else tuple(sorted([source for source, _ in stretches]))
         mine = Precursor(
             kind,
             subject,
             phase,
-            peak,
+            peaks[0][2] if peaks else seen.severity,
             q,
             weight,
             onsets[0],
@@ -239,11 +242,10 @@ def _merge(tracks: Mapping[Key, Track], window: Window, now_ns: int, fresh: set[
             seen.evidence,
             onsets,
         )
-        pair = (kind, subject)
-        if pair in found:
-            mine = _stronger(found[pair], mine)
-        found[pair] = mine
-    return tuple(found.values())
+        if found and found[-1].kind == kind and found[-1].subject == subject:
+            mine = _stronger(found.pop(), mine)
+        found.append(mine)
+    return tuple(found)
 
 
 PHASES: Mapping[Phase, int] = {"cleared": 0, "ongoing": 1, "onset": 2}

@@ -199,8 +199,8 @@ class TrustModel:
     ) -> tuple[TrustState, Trust, bool]:
         """Next state, trust now, and whether some kind is unobserved for longer than the grace time."""
         settings = self._settings
-        since = {kind: state.unobserved_ns.get(kind, now_ns) for kind in unobserved}
-        overdue = any(now_ns - t > settings.grace_s * 1e9 for t in since.values())
+        since: dict[str, int] = {}
+        overdue = False
         gain = 1.0 if state.at_ns < 0 else 1.0 - math.exp((state.at_ns - now_ns) / (settings.recovery_s * 1e9))
         if settings.acts_on == "upper":
             p, p_by_mode, p_by_class = risk.upper, risk.upper_by_mode, risk.upper_by_class
@@ -209,6 +209,8 @@ class TrustModel:
         trust, by_mode, by_class = _complement(p), _complements(p_by_mode), _complements(p_by_class)
         target, modes, classes, coverage = trust, by_mode, by_class, self._all_seen
         if unobserved:
+            since = {kind: state.unobserved_ns.get(kind, now_ns) for kind in unobserved}
+            overdue = any(now_ns - t > settings.grace_s * 1e9 for t in since.values())
             cap = settings.unobserved_cap
             target = min(trust, cap)
             modes = _capped(by_mode, {mode for kind in unobserved for mode in self._modes[kind]}, cap)
@@ -274,7 +276,7 @@ class LevelState(msgspec.Struct, frozen=True, gc=False):
 
 
 FRESH = LevelState()
-NORMAL_LEVEL = ProtectionLevel.NORMAL
+NORMAL_LEVEL, _, PROTECTIVE_LEVEL, MINIMAL_RISK_LEVEL = LEVELS
 
 
 def level_step(state: LevelState, gates: Gates, trust: float, overdue: bool, now_ns: int) -> LevelState:
@@ -317,11 +319,20 @@ def levels_step(
     Lost evidence is the overall level's concern.
     """
     changed: dict[str, LevelState] = {}
+    alarmed: LevelState | None = None
     for group, t in trust.items():
-        state = states.get(group, FRESH)
-        if state.level is not NORMAL_LEVEL or not t >= edges[group][0]:  # else edge_step would give it back
-            changed[group] = edge_step(state, edges[group], t, False, now_ns)
-    if not changed and len(states) == len(trust):
-        return states
+        state, its = states.get(group, FRESH), edges[group]
+        level = state.level
+        if level is NORMAL_LEVEL and t >= its.caution:
+            continue  # edge_step would give it back
+        if level is not MINIMAL_RISK_LEVEL and not t >= its.protective and state.demanded_ns[3] < 0:
+            # what edge_step gives wherever trust is below both gates, made once
+            if alarmed is None:
+                alarmed = LevelState(PROTECTIVE_LEVEL, (-1, now_ns, now_ns, -1))
+            changed[group] = alarmed
+        else:
+            changed[group] = edge_step(state, its, t, False, now_ns)
+    if len(states) == len(trust):
+        return {**states, **changed} if changed else states
     # a reset leaves dimensions out, which begin afresh
     return {group: changed.get(group) or states.get(group, FRESH) for group in trust}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from dataclasses import dataclass
 from typing import Literal
 
@@ -126,7 +127,30 @@ WINDOWS = st.builds(
 
 @given(histories(), WINDOWS)
 def test_agrees_with_brute_force(history: tuple[list[int], dict[str, tuple[int, list[Word]]]], window: Window) -> None:
-    ticks, detectors = history
+    agree(*history, window)
+
+
+SHORT = [Window(0.1), Window(0.25, 0.04), Window(0.25, 1.0), Window(0.05, 0.2, "exponential")]
+
+
+@pytest.mark.parametrize("window", SHORT)
+@pytest.mark.parametrize("seed", range(12))
+def test_agrees_with_brute_force_at_a_tick_of_5_ms(seed: int, window: Window) -> None:
+    """In most ticks nothing begins, recurs, expires or gets worse."""
+    rng = random.Random(seed)
+    ticks = [k * 5 * MS for k in range(1, 161)]
+    detectors = {}
+    for name in ("a", "b")[: 1 + seed % 2]:
+        words: list[Word] = []
+        while len(words) < len(ticks):
+            verdict: Verdict = rng.choice(["present", "present", "absent", "lost"])
+            stretch = ticks[len(words) : len(words) + rng.choice([2, 12, 60])]
+            words += [Word(t, verdict, rng.choice([0.25] * 40 + [0.5, 1.0])) for t in stretch]
+        detectors[name] = (rng.choice([0, 3, 9]) * MS, words)
+    agree(ticks, detectors, window)
+
+
+def agree(ticks: list[int], detectors: dict[str, tuple[int, list[Word]]], window: Window) -> None:
     evidence = Evidence()
     for k, now in enumerate(ticks):
         observed, lost = {}, []
