@@ -128,11 +128,13 @@ def test_severity_has_both_ends() -> None:
 def test_regrasp_cannot_be_held_for_ever() -> None:
     """The motor's heat, theta' = ((F / F_c)^2 - theta) / T, passes 1 after T ln((r - theta_0) / (r - 1))."""
     log = run({**STILL}, 8.0, ["true_normal", "heat"], regrasp=1.0)
-    ratio, start = (46.0 / 32.0) ** 2, (27.0 / 32.0) ** 2
-    hot_s = 15.0 * math.log((ratio - start) / (ratio - 1.0))
+    own = runner("grasp").start
+    limit, most = own["force_continuous"], own["regrasp_force"]
+    ratio, start = (most / limit) ** 2, (own["grip_force"] / limit) ** 2
+    hot_s = own["thermal_time"] * math.log((ratio - start) / (ratio - 1.0))
     before, after = log["t"] < hot_s - 0.1, log["t"] > hot_s + 0.4
-    assert log["true_normal"][before].max() == pytest.approx(46.0, abs=0.1)
-    assert log["true_normal"][after].min() < 32.1
+    assert log["true_normal"][before].max() == pytest.approx(most, abs=0.1)
+    assert log["true_normal"][after].max() < limit + 0.1
 
 
 @pytest.mark.parametrize("parameters", [{"dt": 0.0007}, {"latency": 5.0}, {"mu": 0.1}, {"sensor_period": 0.0123}])

@@ -10,7 +10,7 @@ from plant_runner import Log, runner
 
 from foreshock_fmus import build_fmu
 
-WORN = {"wear_time": 2.0, "wear_rate": 0.4, "wear_max": 1.5}
+WORN = {"wear_time": 2.0, "wear_rate": 0.3, "wear_max": 1.5, "coupling": 0.038}
 QUIET = {"roughness": 0.0, "human_sway": 0.0}
 WATCH = ["advance", "angle", "spindle_rate", "normal_force", "overload", "human_force_peak"]
 
@@ -45,9 +45,10 @@ def test_without_damping_cutting_and_people_energy_stays() -> None:
     E = M u'^2 / 2 + I a'^2 / 2 + k (p - u)^2 / 2 + k_a a^2 / 2 + M_f a + K depth^2 / 2. RK4 at 0.5 ms near 8 Hz.
     """
     lossless = {"damping": 0.0, "wrist_damping": 0.0, "contact_damping": 0.0, "cutting_ratio": 0.0, "human_near": 0.0}
-    knot = {"coupling": 0.05, "knot": 0.5, "knot_time": 0.2, "knot_duration": 0.3, "edge": 5.0, "wrist_torque": 1e3}
+    limits = {"edge": 5.0, "wrist_torque": 1e3, "wrist_continuous": 1e3, "bite_force": 1e3}
+    knot = {"coupling": 0.05, "knot": 0.5, "knot_time": 0.2, "knot_duration": 0.3}
     names = ["advance", "advance_rate", "angle", "angle_rate", "depth"]
-    log = run({**QUIET, **lossless, **knot, "wrist_continuous": 100.0}, 4.0, names)
+    log = run({**QUIET, **lossless, **limits, **knot}, 4.0, names)
     u, v, a, w, depth = (log[n] for n in names)
     forward = 0.35 * (0.0 - 0.05) * 2500.0 * 5000.0 / 7500.0 * 0.024
     elastic = 0.5 * 2500.0 * (0.024 - u) ** 2 + 0.5 * 130.0 * a**2 + 0.5 * 5000.0 * np.maximum(depth, 0.0) ** 2
@@ -58,11 +59,13 @@ def test_without_damping_cutting_and_people_energy_stays() -> None:
 
 
 def test_the_spindle_gains_what_motor_less_cut_gives_it() -> None:
-    names = ["spindle_rate", "spindle_torque_now", "tangential_force", "off_edge"]
+    names = ["spindle_rate", "spindle_torque_now", "tangential_force", "faulted"]
     log = run({"seed": 2.0, **WORN, "human_near": 0.0}, 8.0, names, h=0.001)
     torque = log["spindle_torque_now"] - 0.05 * log["tangential_force"]
     impulse = np.concatenate(([0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]) * 0.001)))
     gained = 0.0004 * (log["spindle_rate"] - log["spindle_rate"][0])
+    held = log["faulted"] < 0.5  # beyond the workpiece's edge the force jumps between two samples
+    gained, impulse = gained[held], impulse[held]
     assert np.ptp(gained) > 0.004  # bites slow it by 10 rad/s at least
     np.testing.assert_allclose(gained, impulse, atol=0.02 * float(np.ptp(gained)))
 
@@ -70,7 +73,7 @@ def test_the_spindle_gains_what_motor_less_cut_gives_it() -> None:
 def test_a_finer_step_gives_the_same_chatter() -> None:
     def angles(dt: float) -> np.ndarray:
         parameters = {**QUIET, **WORN, "knot": 0.3, "knot_time": 0.5, "dt": dt}
-        return run(parameters, 4.5, ["angle"])["angle"]
+        return run(parameters, 5.5, ["angle"])["angle"]
 
     coarse, middle, fine = (angles(dt) for dt in (0.001, 0.0005, 0.00025))
     assert np.ptp(fine[-100:]) > 0.02

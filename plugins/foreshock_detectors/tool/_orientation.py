@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from foreshock.messages import Capsule, HumanPose, Odometry, Vec3
+from foreshock.messages import HumanPose, Odometry, Vec3
 from foreshock_detectors.tool._config import ToolConfig
 
 __all__ = ["axis", "nearest", "unsafe"]
@@ -24,29 +24,27 @@ def axis(q: tuple[float, float, float, float]) -> Vec3 | None:
     return (1.0 - s * (y * y + z * z), s * (x * y + w * z), s * (x * z - w * y))
 
 
-def _on(c: Capsule, p: Vec3) -> tuple[float, Vec3]:
-    """Distance (m) of a point from a capsule's surface, and the vector from it to the capsule's axis."""
-    a, b = c.a, c.b
-    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    px, py, pz = a[0] - p[0], a[1] - p[1], a[2] - p[2]
-    length = dx * dx + dy * dy + dz * dz
-    if length > 0.0:
-        s = -(px * dx + py * dy + pz * dz) / length
-        s = 0.0 if s < 0.0 else 1.0 if s > 1.0 else s
-        px, py, pz = px + s * dx, py + s * dy, pz + s * dz
-    return math.sqrt(px * px + py * py + pz * pz) - c.radius, (px, py, pz)
-
-
 def nearest(humans: Iterable[HumanPose], tip: Vec3) -> tuple[float, Vec3] | None:
-    """Distance (m) to the nearest human's surface, less its uncertainty, and the vector to that place."""
-    best: tuple[float, Vec3] | None = None
+    """Distance (m) to the nearest human's surface, less its uncertainty, and the vector to that capsule's axis."""
+    x, y, z = tip
+    least, vector, sqrt = math.inf, (0.0, 0.0, 0.0), math.sqrt
     for human in humans:
         for capsule in human.capsules:
-            distance, vector = _on(capsule, tip)
-            distance -= human.uncertainty
-            if best is None or distance < best[0]:
-                best = (distance, vector)
-    return best
+            ax, ay, az = capsule.a
+            bx, by, bz = capsule.b
+            dx, dy, dz = bx - ax, by - ay, bz - az
+            px, py, pz = ax - x, ay - y, az - z
+            length = dx * dx + dy * dy + dz * dz
+            s = -(px * dx + py * dy + pz * dz)
+            if s >= length:
+                px, py, pz = bx - x, by - y, bz - z
+            elif s > 0.0:
+                s /= length
+                px, py, pz = px + s * dx, py + s * dy, pz + s * dz
+            distance = sqrt(px * px + py * py + pz * pz) - capsule.radius - human.uncertainty
+            if distance < least:
+                least, vector = distance, (px, py, pz)
+    return None if least == math.inf else (least, vector)
 
 
 def _angle(a: Vec3, b: Vec3) -> float:
