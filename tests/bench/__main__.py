@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from tests.bench import core, fmu_step, tick
+from tests.bench import core, fmu_step, live, tick
 from tests.bench.rows import Row
 
 OUT = Path("bench.json")
@@ -19,9 +19,12 @@ OUT = Path("bench.json")
 def main() -> int:
     """Run every benchmark."""
     rows: list[Row] = []
-    for part in track((tick, core, fmu_step), description="bench", console=Console(stderr=True), transient=True):
+    for part in track((tick, core, fmu_step, live), description="bench", console=Console(stderr=True), transient=True):
         rows += part.rows()
-    table = Table(title="Foreshock benchmarks (CPU time; reference measured in the same run)", title_justify="left")
+    table = Table(
+        title="Foreshock benchmarks (us: CPU time; ms: wall clock; reference measured in the same run)",
+        title_justify="left",
+    )
     for column in ("what", "value", "unit", "reference", "ratio", "aim", "holds"):
         table.add_column(column, overflow="fold")
     for r in rows:

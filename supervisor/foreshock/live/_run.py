@@ -73,7 +73,7 @@ class LiveSupervisor:
         self._base = base
         self._journal: SegmentedJournal | None = None
         self._needed = self.supervisor.required_channels()
-        self._missing = sorted(self._needed)
+        self._missing = sorted(self._needed) or [s.channel for s in self._streams]
         self._times = TickTimes()
         self._history: deque[tuple[int, bytes]] = deque()
         self._health: dict[str, str] = {}
@@ -116,7 +116,7 @@ class LiveSupervisor:
         for stream in self._streams:
             samples += stream.drain(now_ns)
         if self._missing:
-            self._missing = [s.channel for s in self._streams if s.arrived_ns < 0 and s.channel in self._needed]
+            self._missing = self._silent()
             if self._missing:
                 self._answer()
                 return None
@@ -144,6 +144,13 @@ class LiveSupervisor:
         self._publish(decision, now_ns)
         self._answer()
         return decision
+
+    def _silent(self) -> list[str]:
+        """Streams that have not begun, of those that are needed; where none is, all of them until any has."""
+        silent = [s.channel for s in self._streams if s.arrived_ns < 0]
+        if self._needed:
+            return [c for c in silent if c in self._needed]
+        return silent if len(silent) == len(self._streams) else []
 
     def _answer(self) -> None:
         self._services.answer(self.status, self._run, self.supervisor.taxonomy, self._history)
