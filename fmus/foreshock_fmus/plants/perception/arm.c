@@ -47,7 +47,7 @@ void arm_rhs(const Plant *self, const double *vars, const double x[X_SIZE], doub
     const double up = push(body_forearm.stiffness, vars[V_contact_damping], depth_of(self, vars, x), x[X_SPEED + 2], &lost_forearm) +
                       push(TABLE_STIFFNESS, vars[V_contact_damping], fmax(-x[2], 0.0), x[X_SPEED + 2], &lost_table);
     for (int k = 0; k < 3; k++) {
-        const double servo = CLIP(vars[V_arm_stiffness] * (self->reference[k] - x[k]) +
+        const double servo = clip(vars[V_arm_stiffness] * (self->reference[k] - x[k]) +
                                       vars[V_arm_damping] * (self->reference_speed[k] - x[X_SPEED + k]),
                                   -vars[V_arm_force], vars[V_arm_force]);
         dx[k] = x[X_SPEED + k];

@@ -12,11 +12,13 @@
 #define TICK 0.002  /* s, reference of the arm */
 #define RING_SIZE 16
 #define TABLE_STIFFNESS 50000.0 /* N/m, under the gripper's rubber */
-#define CLIP(x, low, high) ((x) < (low) ? (low) : (x) > (high) ? (high) : (x))
 
 enum { FOREARM, TOOL, THINGS };
 enum { PHASE_READY, PHASE_REACH, PHASE_DESCEND, PHASE_GRASP, PHASE_RETURN };
 enum { X_PLACE = 0, X_SPEED = 3, X_WORK = 6, X_HEAT, X_SIZE };
+
+/* A function and no macro: the argument may be a draw, and is to be evaluated once. */
+static inline double clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 
 /* What the network says of one thing in one frame. share is the evidence for a tool against that for a limb. */
 typedef struct {

@@ -10,9 +10,9 @@ void network_frame(Plant *self, const double *vars, double t) {
     self->ring_at = (self->ring_at + 1) % RING_SIZE;
     Picture *p = &self->ring[self->ring_at];
     p->time = t;
-    p->luminance = CLIP(self->image.luminance * (1.0 + rough * stream_normal(&self->sensor)), 0.0, 1.0);
-    p->contrast = CLIP(self->image.contrast * (1.0 + rough * stream_normal(&self->sensor)), 0.0, 1.0);
-    p->sharpness = CLIP(self->image.sharpness * (1.0 + 2.0 * rough * stream_normal(&self->sensor)), 0.0, 1.0);
+    p->luminance = clip(self->image.luminance * (1.0 + rough * stream_normal(&self->sensor)), 0.0, 1.0);
+    p->contrast = clip(self->image.contrast * (1.0 + rough * stream_normal(&self->sensor)), 0.0, 1.0);
+    p->sharpness = clip(self->image.sharpness * (1.0 + 2.0 * rough * stream_normal(&self->sensor)), 0.0, 1.0);
     p->saturated = self->image.saturated;
     for (int i = 0; i < THINGS; i++) {
         /* logits of its own class, of the other, of the background; the sleeve gives some tool evidence of its own */

@@ -20,9 +20,9 @@ Image optics_image(const Plant *self, const double *vars) {
     const double ratio = spread / (self->exposure * vars[V_read_noise] + 1e-12), half = vars[V_noise_tolerance];
     const double ratio_clear = unit * vars[V_reflectance_sd] / (vars[V_read_noise] + 1e-12);
     Image image;
-    image.luminance = CLIP(bright, 0.0, 1.0);
-    image.contrast = CLIP(spread / bright, 0.0, 1.0);
-    image.sharpness = CLIP(relative * relative * fine * fine, 0.0, 1.0);
+    image.luminance = clip(bright, 0.0, 1.0);
+    image.contrast = clip(spread / bright, 0.0, 1.0);
+    image.sharpness = clip(relative * relative * fine * fine, 0.0, 1.0);
     image.saturated = 0.5 * erfc((1.0 - bright) / (spread + 1e-9) / sqrt(2.0));
     image.visibility = relative * fine * (ratio / (ratio + half)) / (ratio_clear / (ratio_clear + half));
     if (self->spoilt) image.visibility *= vars[V_glitch_visibility];
@@ -39,7 +39,7 @@ void optics_frame(Plant *self, const double *vars, double t) {
     self->illumination = lamp * (vars[V_cause] > 0.5 && vars[V_cause] < 1.5 ? exp(-vars[V_light_scale] * self->depth) : 1.0);
     double mean, sd;
     scene(self, vars, &mean, &sd);
-    const double wanted = CLIP(vars[V_reflectance] / mean, 0.05, vars[V_exposure_most]);
+    const double wanted = clip(vars[V_reflectance] / mean, 0.05, vars[V_exposure_most]);
     self->exposure += (1.0 - exp(-FRAME / vars[V_exposure_time])) * (wanted - self->exposure);
     self->spoilt = (double)(stream_next(&self->process) >> 11) * 0x1p-53 < vars[V_glitch_share];
     self->image = optics_image(self, vars);
