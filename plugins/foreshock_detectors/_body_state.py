@@ -12,15 +12,11 @@ from numpy.typing import NDArray
 from foreshock.clock import NS_PER_S
 from foreshock.messages import JointState, Odometry, Vec3
 from foreshock_detectors._floating_base import FloatingBase
+from foreshock_detectors._quaternion import Quaternion, unit
 
-__all__ = ["BodyVectors", "Quaternion"]
+__all__ = ["BodyVectors"]
 
 Array: TypeAlias = NDArray[np.float64]
-Quaternion: TypeAlias = tuple[float, float, float, float]
-
-QUATERNION_TOLERANCE = 0.01
-"""A base quaternion farther off unit length than this is no orientation (1 % already shifts TALOS's CoM by 0.8 mm if it
-is not normalised); below, it is normalised."""
 
 
 class BodyVectors:
@@ -99,11 +95,10 @@ def _check(joints: JointState, odometry: Odometry) -> None:
 
 
 def _unit(quaternion: Quaternion) -> Quaternion:
-    x, y, z, w = quaternion
-    norm = math.sqrt(x * x + y * y + z * z + w * w)
-    if abs(norm - 1.0) > QUATERNION_TOLERANCE:
-        raise ValueError(f"base/odometry: orientation has norm {norm:.4f}, not 1 within {QUATERNION_TOLERANCE:.0%}")
-    return x / norm, y / norm, z / norm, w / norm
+    found = unit(quaternion)
+    if found is None:
+        raise ValueError(f"base/odometry: orientation has norm {math.hypot(*quaternion):.4f}, not 1")
+    return found
 
 
 def _carried(position: Vec3, quaternion: Quaternion, odometry: Odometry, dt_s: float) -> tuple[Vec3, Quaternion]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from itertools import groupby, pairwise
 
+import msgspec
 import numpy as np
 import pytest
 from co_carry_stream import Carried
@@ -126,6 +127,19 @@ def test_the_load_may_be_turned_in_the_world() -> None:
         samples.append(Sample(s.stamp_ns, s.channel, v, s.seq))
     straight = play(Carried(lag=lambda t: ramp(t, 4.0, 1.8)).samples(8.0))
     assert onset_s(play(samples, CoCarryConfig(axis=(-1.0, 0.0, 0.0))), PHASE) == onset_s(straight, PHASE)
+
+
+def test_a_load_whose_orientation_is_no_rotation_leaves_its_ends_unobserved() -> None:
+    said = play(
+        [
+            msgspec.structs.replace(s, value=msgspec.structs.replace(s.value, orientation=(0.0, 0.0, 0.0, 0.0)))
+            if isinstance(s.value, Odometry) and s.stamp_ns > 4_000_000_000
+            else s
+            for s in Carried().samples(6.0)
+        ]
+    )
+    assert {i.kind for i in said if i.stamp_ns <= 4_000_000_000} == {SHARE, PHASE, DESYNC}
+    assert {i.kind for i in said if i.stamp_ns > 4_000_000_000} == {SHARE, DESYNC}
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import msgspec
 import pytest
 from crossing_walkers import RADIUS_M, Place, encounter, straight
 
@@ -154,6 +155,18 @@ def test_nobody_there_is_absence_and_a_missing_input_is_not() -> None:
     for channel in ("base/odometry", "plan/path", "humans/pose"):
         rest = [s for s in encounter(ROBOT, across(), 1.0) if not s.channel.endswith(channel)]
         assert not any(said for _, said in play(rest))
+
+
+def test_an_orientation_that_is_no_rotation_is_an_error_and_not_level() -> None:
+    samples = encounter(ROBOT, across(), 1.0)
+    spoiled = [
+        msgspec.structs.replace(s, value=msgspec.structs.replace(s.value, orientation=(0.0, 0.0, 0.0, 0.0)))
+        if s.channel.endswith("base/odometry")
+        else s
+        for s in samples
+    ]
+    with pytest.raises(ValueError, match="no rotation"):
+        play(spoiled)
 
 
 def test_speed_that_falls_a_little_below_the_threshold_stays_high() -> None:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from foreshock.detector import Inputs
 from foreshock.messages import GripState, Odometry, Scalar, WrenchStamped
 from foreshock.records import Indication, Sample, SampleRef
+from foreshock_detectors._quaternion import unit
 from foreshock_detectors._sequential import Hysteresis, severity
 from foreshock_detectors.co_carry._config import CoCarryConfig
 from foreshock_detectors.co_carry._lag import Lag
@@ -27,7 +28,10 @@ def _unit(v: Triple) -> Triple:
 
 
 class CoCarryDetector:
-    """Implements foreshock.detector.Detector. A kind whose channels are missing or have not settled is left out."""
+    """Implements foreshock.detector.Detector. A kind whose channels are missing or have not settled is left out.
+
+    So is phase-mismatch while the load's orientation is no rotation.
+    """
 
     def __init__(self, config: CoCarryConfig) -> None:
         self._config = config
@@ -43,6 +47,7 @@ class CoCarryDetector:
         self._mismatched = Hysteresis(c.phase_error_rad, RELEASE * c.phase_error_rad, hold, confirm)
         self._desynced = Hysteresis(c.desync_rad, RELEASE * c.desync_rad, hold, confirm)
         self._end_lag = self._grip_lag = 0.0
+        self._turned = True
 
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:  # noqa: ARG002  # time is the samples' own
         """One indication per kind that can be judged."""
@@ -56,7 +61,7 @@ class CoCarryDetector:
                 found.append(self._shared(wrench, share))
         for sample in new.get("load", ()):
             self._swing(sample)
-        if load is not None and self._ends.observed:
+        if load is not None and self._turned and self._ends.observed:
             found.append(self._lagging("phase-mismatch", load, self._ends, self._mismatched, self._end_lag, "m_s"))
         for sample in new.get("grip", ()):
             self._squeeze(sample)
@@ -75,7 +80,11 @@ class CoCarryDetector:
         value = sample.value
         if not isinstance(value, Odometry):
             return
-        x, y, z, w = value.orientation
+        orientation = unit(value.orientation)
+        self._turned = orientation is not None
+        if orientation is None:
+            return
+        x, y, z, w = orientation
         up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))  # in the load's frame
         (vx, vy, vz), (rx, ry, rz), (ax, ay, az) = value.linear, value.angular, self._axis
         middle = up[0] * vx + up[1] * vy + up[2] * vz

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from foreshock.messages import Capsule, HumanPose, Odometry
+from foreshock_detectors._quaternion import unit
 
 __all__ = ["Disc", "Mover", "discs", "place"]
 
@@ -15,8 +16,15 @@ Disc: TypeAlias = tuple[float, float, float]
 
 
 def place(message: Odometry) -> tuple[float, float, float, float]:
-    """x, y (m) and the velocity in the odometry's own frame (m/s); its twist is in the child frame."""
-    qx, qy, qz, qw = message.orientation
+    """x, y (m) and the velocity in the odometry's own frame (m/s); its twist is in the child frame.
+
+    Raises:
+        ValueError: the orientation is no rotation.
+    """
+    orientation = unit(message.orientation)
+    if orientation is None:
+        raise ValueError(f"odometry: orientation {list(message.orientation)} is no rotation; expected unit length")
+    qx, qy, qz, qw = orientation
     vx, vy, vz = message.linear
     x, y, _ = message.position
     return (
