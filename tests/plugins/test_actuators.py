@@ -60,6 +60,17 @@ def test_short_peak_of_an_acceleration_is_no_saturation() -> None:
     assert present(play(stream(3.0, torque=lambda t: 52.0 * math.sin(6.0 * t)))) == set()
 
 
+@pytest.mark.parametrize("given", [6.0, -6.0])
+def test_drive_of_which_nothing_is_asked_owes_nothing_either_way(given: float) -> None:
+    rows = stream(2.0, torque=lambda _: 0.0)
+    held = [
+        [msgspec.structs.replace(s, value=msgspec.structs.replace(s.value, effort=(1.0, given))), c] for s, c in rows
+    ]
+    history = play(held)
+    assert present(history) == set()
+    assert history[-1][SATURATION].measures["owed"] == 0.0
+
+
 def test_drive_that_gives_more_than_it_is_asked_owes_nothing() -> None:
     rows = stream(2.0)
     more = [

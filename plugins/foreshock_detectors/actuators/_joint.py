@@ -13,8 +13,8 @@ class Joint:
     """Implements the two kinds for one joint.
 
     torque-saturation: the statistic is the larger of owed / shortfall and used / use, owed = (commanded - delivered) *
-    sign(commanded) / rated, used = |delivered| / rated; it counts at 1. A drive that brakes more than it is asked owes
-    nothing.
+    sign(commanded) / rated, used = |delivered| / rated; it counts at 1. A drive that gives more than it is asked
+    owes nothing, nor does one of which nothing is asked.
     actuator-drift: |exponential mean of (commanded - measured position)|, so that a shake about the command, which has
     no mean, is no drift.
 
@@ -36,7 +36,7 @@ class Joint:
         self, config: ActuatorsConfig, asked: float, given: float, stamp_ns: int, seen: tuple[SampleRef, ...]
     ) -> Indication:
         """Torques in N m: commanded and delivered."""
-        owed = (asked - given if asked > 0.0 else given - asked) / self._peak
+        owed = (asked - given if asked > 0.0 else given - asked if asked < 0.0 else 0.0) / self._peak
         used = abs(given) / self._peak
         statistic = max(owed / config.shortfall, used / config.use)
         present = self._saturated.push(statistic, stamp_ns)
