@@ -115,6 +115,14 @@ def test_joint_that_is_not_streamed_leaves_arm_and_trunk_unobserved() -> None:
         assert {kind for kind, _ in said} == {BREACH}
 
 
+def test_human_without_a_body_is_nowhere_and_not_far_away() -> None:
+    def people(_: float):
+        return (person("ann", 1.0), HumanPose("bob", (), None, 0.02))
+
+    for _, said in play(Motion(SWING, people=people), 0.3):
+        assert {kind for kind, _ in said} == {ARM, TORSO}
+
+
 def test_no_false_alarm_in_three_minutes_of_work_beside_a_human() -> None:
     """Planned lifting at up to 1 rad/s, tracked to 0.2 rad/s; sway of the trunk at 0.3 rad/s; a human at 0.4 m."""
     work = {"shoulder": lambda t: math.sin(2.0 * t), "elbow": lambda t: -math.sin(2.0 * t)}

@@ -103,13 +103,18 @@ class RecoveryDetector:
         )
 
     def _judge_people(self, found: list[Indication], now_ns: int, inputs: Inputs) -> None:
-        """The worst pair of hand and human, per human; unobserved while a hand or the humans are not seen."""
+        """The worst pair of hand and human, per human; unobserved while a hand or the humans are not seen.
+
+        So it is while a human has no body.
+        """
         config, latest = self._config, inputs.latest
         people = latest.get("humans")
         hands = [sample for arm in config.arms if (sample := latest.get(f"hand-{arm}")) is not None]
         if people is None or len(hands) < len(config.arms):
             return
         humans = cast(Humans, people.value).humans
+        if not all(human.capsules for human in humans):
+            return  # somebody without a body is nowhere, not far away
         for human in humans:
             gap, separation, needed, hand = self._worst(hands, human)
             near = self._near.get(human.id)
