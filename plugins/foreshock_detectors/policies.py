@@ -35,7 +35,7 @@ class PaperGate:
     """
 
     def __init__(self, config: PaperGateConfig) -> None:
-        self._mode = config.mode
+        self._mode = builtin_taxonomy().mode(config.mode).code
 
     def propose(self, situation: Situation) -> Sequence[Proposal]:
         """The four protocols at full strength while the mode is at the protective level."""
@@ -65,8 +65,9 @@ class CountRule:
 
     def __init__(self, config: CountRuleConfig) -> None:
         taxonomy = builtin_taxonomy()
-        self._mode, self._least = config.mode, config.least
-        self._cascade = frozenset(taxonomy.kind(k).id for k in taxonomy.mode(config.mode).cascade)
+        mode = taxonomy.mode(config.mode)
+        self._mode, self._least = mode.code, config.least
+        self._cascade = frozenset(taxonomy.kind(k).id for k in mode.cascade)
 
     def propose(self, situation: Situation) -> Sequence[Proposal]:
         """The four protocols at full strength while enough kinds are in the window."""
@@ -115,7 +116,7 @@ class Ladder:
     """Speed scale from overall trust, cheap actions at the caution gate, all protocols at the protective gate."""
 
     def __init__(self, config: LadderConfig) -> None:
-        self._c = config
+        self._c, self._mode = config, builtin_taxonomy().mode(config.mode).code
 
     def propose(self, situation: Situation) -> Sequence[Proposal]:
         """What holds now; the speed scale never rises when trust falls."""
@@ -124,16 +125,16 @@ class Ladder:
         if not scale >= 1.0:
             rule = f"speed scaled to {scale:.2f} by overall trust"
             proposals.append(Proposal("speed-scale", 1.0 - scale, situation.overall_level, "", rule))
-        level = situation.levels.get(c.mode, ProtectionLevel.MINIMAL_RISK)
+        level = situation.levels.get(self._mode, ProtectionLevel.MINIMAL_RISK)
         if level >= ProtectionLevel.PROTECTIVE:
-            rule = f"{c.mode}: trust below the protective gate"
+            rule = f"{self._mode}: trust below the protective gate"
             actions: tuple[str, ...] = (*c.protective, "impact-mitigation")
         elif level >= ProtectionLevel.CAUTION:
-            rule = f"{c.mode}: trust below the caution gate"
+            rule = f"{self._mode}: trust below the caution gate"
             actions = c.caution
         else:
             return proposals
-        return proposals + [Proposal(a, 1.0, level, c.mode, rule) for a in actions]
+        return proposals + [Proposal(a, 1.0, level, self._mode, rule) for a in actions]
 
     def speed(self, trust: float) -> float:
         """Share of full speed allowed at this overall trust; NaN gives the floor."""

@@ -42,6 +42,18 @@ def test_the_papers_gate_does_nothing_before_it() -> None:
     assert actions(gate, ProtectionLevel.PROTECTIVE, 0.2) == set(PROTOCOLS)
 
 
+def test_a_mode_may_be_named_by_its_id() -> None:
+    """Its level is looked up by the code; one that is missing would count as the worst."""
+    calm, hot = situation(ProtectionLevel.NORMAL), situation(ProtectionLevel.PROTECTIVE)
+    for policy in (
+        Ladder(LadderConfig("fall-onto-human")),
+        PaperGate(PaperGateConfig("fall-onto-human")),
+        CountRule(CountRuleConfig("fall-onto-human")),
+    ):
+        assert list(policy.propose(calm)) == []
+        assert {p.mode for p in policy.propose(hot)} <= {"A1"}
+
+
 def test_speed_never_rises_when_trust_falls_and_nan_is_slowest() -> None:
     ladder = Ladder(LadderConfig())
     speeds = [ladder.speed(k / 200) for k in range(201)]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import pytest
+from click.testing import CliRunner
 
+from foreshock.cli.policies_cmd import policies
 from foreshock.config import PolicyEntry
 from foreshock.records import ProtectionLevel
 from foreshock.session.ladder import PHASES, TIMES_S, Cell, KindState, _broken, check_ladder
@@ -49,3 +52,13 @@ def test_the_protocol_of_a_mode_is_ordered_over_every_state() -> None:
     levels = {c.level for c in found}
     assert levels == {ProtectionLevel.NORMAL, ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE}
     assert {a for c in found for a in c.actions} == {"regrasp", "lower-load", "speed-scale"}
+
+
+def test_the_command_runs_any_policy_for_the_mode_that_is_checked() -> None:
+    """The ladder is for A1 by itself; checked for A5 it acts on the trust of A5."""
+    done = CliRunner().invoke(policies, ["check", "A5", "--policy", "ladder", "--json"], standalone_mode=False)
+    assert done.return_value == 0
+    (answer,) = json.loads(done.stdout)["result"]
+    assert answer["broken"] == []
+    acting = {c["level"] for c in answer["table"] if "balance-lock" in c["actions"]}
+    assert acting == {ProtectionLevel.PROTECTIVE}

@@ -60,8 +60,8 @@ def check(mode: tuple[str, ...], policy: str, as_json: bool) -> int:
     with Progress(console=notes, transient=True, disable=as_json) as bar:
         task = bar.add_task("states", total=STATES_PER_MODE * len(codes))
         for code in codes:
-            entry = (PolicyEntry("ladder"), PolicyEntry(policy, {"mode": code}))[policy != "ladder" :]
-            results[code] = check_ladder(code, entry[:1], done=lambda: bar.update(task, advance=1))
+            entry = PolicyEntry(policy, {"mode": code})
+            results[code] = check_ladder(code, [entry], done=lambda: bar.update(task, advance=1))
     broken = {code: found for code, (_, found) in results.items()}
     if as_json:
         emit(
