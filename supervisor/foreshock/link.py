@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,12 +11,20 @@ import msgspec
 
 from foreshock._strict import within
 from foreshock.errors import BadInputError, ConfigError, MissingExtraError
-from foreshock.wire import Keys, Naming
+from foreshock.wire import Keys, Naming, liveliness_token
 
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["DEFAULT_ENDPOINT", "AccessRule", "LinkSettings", "TlsSettings", "keys_of", "open_link"]
+__all__ = [
+    "DEFAULT_ENDPOINT",
+    "AccessRule",
+    "LinkSettings",
+    "TlsSettings",
+    "keys_of",
+    "open_link",
+    "ros_tokens",
+]
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 OWN = ("lease", "intervention", "decision")
@@ -134,6 +143,26 @@ def open_link(link: LinkSettings, base: Path | None = None) -> zenoh.Session:
     except zenoh.ZError as e:
         where = ", ".join((*link.listen, *link.connect))
         raise BadInputError("link", f"cannot be opened on {where}: {e}") from None
+
+
+def ros_tokens(session: Any, keys: Keys, kind: Literal["MP", "MS"], channels: Mapping[str, str]) -> list[Any]:
+    """Tokens by which ROS 2 nodes on rmw_zenoh see a node ``foreshock`` with its topics; none in our own scheme.
+
+    Args:
+        session: open.
+        keys: of the robot.
+        kind: publisher (MP) or subscription (MS).
+        channels: ROS 2 type, by channel.
+    """
+    if keys.naming != "rmw_zenoh":
+        return []
+    zid, node = str(session.zid()), "foreshock"
+    tokens = [liveliness_token(keys.domain, zid, 0, 0, "NN", node)]
+    tokens += [
+        liveliness_token(keys.domain, zid, 0, k, kind, node, f"/{channel}", ros)
+        for k, (channel, ros) in enumerate(sorted(channels.items()), 1)
+    ]
+    return [session.liveliness().declare_token(token) for token in tokens]
 
 
 def _options(link: LinkSettings, base: Path) -> dict[str, Any]:

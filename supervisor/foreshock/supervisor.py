@@ -97,14 +97,17 @@ class Supervisor:
         """Specs of the detectors that run, by id."""
         return tuple(c.spec for c in self._pipeline.detectors)
 
+    def inputs(self) -> list[Input]:
+        """What the detectors read by name, with full channels."""
+        return [i for c in self._pipeline.detectors for i in c.inputs if i.channel != "*"]
+
     def channels(self) -> list[tuple[str, type]]:
         """Every channel that a detector reads by name, with the message class that it wants there."""
-        return [(i.channel, i.type) for c in self._pipeline.detectors for i in c.inputs if i.channel != "*"]
+        return [(i.channel, i.type) for i in self.inputs()]
 
     def required_channels(self) -> frozenset[str]:
         """Channels without which some detector observes nothing."""
-        needs = [i for c in self._pipeline.detectors for i in c.inputs]
-        return frozenset(i.channel for i in needs if i.required and i.channel != "*")
+        return frozenset(i.channel for i in self.inputs() if i.required)
 
     def reset(self, seed: int, now_ns: int = 0) -> None:
         """Forget everything; warm-up begins at now_ns."""

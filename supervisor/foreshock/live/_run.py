@@ -15,8 +15,9 @@ from typing import Any, cast
 from foreshock.clock import NS_PER_S, monotonic_ns, sleep_until, wall_ns
 from foreshock.errors import BadInputError, ConfigError, nearest
 from foreshock.journal import DigestJournal
-from foreshock.link import keys_of, open_link
+from foreshock.link import keys_of, open_link, ros_tokens
 from foreshock.live._config import RunConfig
+from foreshock.live._handshake import Handshakes
 from foreshock.live._journal import SegmentedJournal
 from foreshock.live._publish import decision_bytes
 from foreshock.live._robot import RobotLink
@@ -64,6 +65,8 @@ class LiveSupervisor:
             self._robot = RobotLink(self._session, keys, run.live, self.epoch)
             self._decisions = self._session.declare_publisher(keys.service("decision"))
             self._services = Services(self._session, keys)
+            self._handshakes = Handshakes(self._session, keys, self.supervisor.inputs())
+            self._tokens = ros_tokens(self._session, keys, "MS", {c: ROS_NAMES[cls] for c, cls in channels.items()})
             self._token = self._session.liveliness().declare_token(keys.alive("supervisor", str(self.epoch)))
             self._began_ns = monotonic_ns()
             self._digest = DigestJournal()
@@ -131,7 +134,9 @@ class LiveSupervisor:
         self._robot.hear(now_ns)
         self._robot.tell(decision, now_ns)
         self._decision = decision
-        self._robot.grant(self.supervisor, now_ns, permitted=not self._robot.overdue(now_ns))
+        self._handshakes.update(self._services.peers(), now_ns)
+        permitted = not self._robot.overdue(now_ns) and not self._handshakes.refused
+        self._robot.grant(self.supervisor, now_ns, permitted=permitted)
         verdicts = self.supervisor.verdicts_of(decision)
         self._digest.tick(samples, decision, verdicts)
         if self._journal is not None:
@@ -160,6 +165,8 @@ class LiveSupervisor:
         now_ns, d = monotonic_ns(), self._decision
         overdue = self._robot.overdue(now_ns)
         withheld = f"no guard has acknowledged {', '.join(overdue)}" if overdue else ""
+        if refused := self._handshakes.refused:
+            withheld = "; ".join(f"{twin} is refused: {why}" for twin, why in refused.items())
         if self._missing:
             withheld = f"waiting for {', '.join(self._missing)}"
         faults = {s.channel: f"link: {s.counts.last_fault}" for s in self._streams if s.counts.last_fault}
@@ -175,7 +182,7 @@ class LiveSupervisor:
             trust=0.0 if d is None else d.trust.trust,
             control_trust=0.0 if d is None else d.trust.control_trust,
             trust_by_mode={} if d is None else d.trust.control_by_mode,
-            motion_permitted=d is not None and d.motion_permitted and not overdue,
+            motion_permitted=d is not None and d.motion_permitted and not withheld,
             withheld=withheld,
             leases=self._robot.granted,
             guards={name: (now_ns - at) / NS_PER_S for name, at in self._robot.guards.items()},

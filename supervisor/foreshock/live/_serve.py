@@ -12,7 +12,7 @@ import msgspec
 from foreshock.clock import NS_PER_S, monotonic_ns, sleep_until, wall_ns
 from foreshock.errors import ForeshockError
 from foreshock.guard import Guard
-from foreshock.link import LinkSettings, keys_of, open_link
+from foreshock.link import LinkSettings, keys_of, open_link, ros_tokens
 from foreshock.records import Intervention
 from foreshock.twin import Twin
 from foreshock.wire import (
@@ -126,10 +126,18 @@ class FreeRunning:
 
         self._twin, self._codec, self._lock = twin, Codec(), threading.Lock()
         self._waiting: list[Intervention] = []
-        self.guard = Guard(robot, self._intervened, self._minimal_risk, link, f"twin-{wall_ns()}", base=base)
+        name = str(wall_ns())
+        self.guard = Guard(robot, self._intervened, self._minimal_risk, link, f"twin-{name}", base=base)
         self._session: Any = open_link(link, base)
         keys = keys_of(link, robot)
         self._gid = wall_ns().to_bytes(16, "little")
+        hello = msgspec.json.encode(hello_of(twin, robot, "real"))
+        key = keys.service(f"twin/{name}")
+        self._hello = self._session.declare_queryable(key, lambda query: query.reply(key, hello))
+        self._token = self._session.liveliness().declare_token(keys.alive("twin", name))
+        self._tokens = ros_tokens(
+            self._session, keys, "MP", {f"{robot}/{c.name}": BY_NAME[c.type] for c in twin.channels}
+        )
         self._publishers = {
             f"{robot}/{c.name}": self._session.declare_publisher(
                 keys.stream(f"{robot}/{c.name}", BY_NAME[c.type]),

@@ -143,13 +143,20 @@ def unpack_samples(rows: Sequence[WireSample], codec: Codec) -> list[Sample]:
     return found
 
 
-def check_hello(hello: Hello, place: str) -> None:
+def check_hello(hello: Hello, place: str, stepped: bool = True) -> None:
     """Refuse a twin that speaks something else.
+
+    Args:
+        hello: what it declares.
+        place: who it is, for the error.
+        stepped: it is to be stepped; else it streams on a clock of its own.
 
     Raises:
         WireError: names what differs.
     """
-    for name, wanted in (("protocol", PROTOCOL), ("units", "SI"), ("frames", "REP-103"), ("stepped", True)):
+    clock = "simulated" if stepped else "real"
+    expected = {"protocol": PROTOCOL, "units": "SI", "frames": "REP-103", "stepped": stepped, "clock": clock}
+    for name, wanted in expected.items():
         if getattr(hello, name) != wanted:
             raise WireError(f"{place}: {name}", f"{getattr(hello, name)!r}, {wanted!r} is expected")
     for channel in hello.channels:

@@ -1,0 +1,95 @@
+"""Who joins: twins that declare something else are refused by name; a robot on rmw_zenoh needs no bridge."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+
+sys.path.append(str(Path(__file__).parent))
+from robot import CONFIG, Robot, free_endpoint, supervisor, until
+
+from foreshock.link import LinkSettings, open_link
+from foreshock.messages import GripState
+from foreshock.wire import ChannelNote, Codec, Hello, Keys, dds_name, pack_attachment, rihs01
+
+pytest.importorskip("zenoh")
+GRIP = "foreshock_msgs/msg/GripState"
+GOOD = Hello(
+    1,
+    "robot",
+    10_000_000,
+    False,
+    "real",
+    "SI",
+    "REP-103",
+    (ChannelNote("left_gripper/state", GRIP, rihs01(GRIP), 10_000_000),),
+    (),
+)
+SLOW = (ChannelNote("left_gripper/state", GRIP, rihs01(GRIP), 1_000_000_000),)
+OTHER = (ChannelNote("left_gripper/state", GRIP, "RIHS01_00", 10_000_000),)
+
+
+def test_a_twin_that_means_something_else_is_refused_by_name(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    cases = [
+        (GOOD, ""),
+        (msgspec.structs.replace(GOOD, units="imperial"), "units: 'imperial', 'SI' is expected"),
+        (msgspec.structs.replace(GOOD, frames="z-down"), "frames: 'z-down'"),
+        (msgspec.structs.replace(GOOD, clock="simulated"), "clock: 'simulated'"),
+        (msgspec.structs.replace(GOOD, channels=OTHER), "has the hash RIHS01_00"),
+        (msgspec.structs.replace(GOOD, channels=SLOW), "1 samples a second, a detector needs"),
+    ]
+    text = CONFIG.replace('use = "grip"', 'use = "grip"\nconfig = {{ min_rate_hz = 20.0 }}')
+    with supervisor(tmp_path, endpoint, text), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        for k, (hello, said) in enumerate(cases):
+            name, answer = f"twin/{k}", msgspec.json.encode(hello)
+            key = robot.keys.service(name)
+            with open_link(robot.link) as session:
+                queryable = session.declare_queryable(key, lambda q, key=key, answer=answer: q.reply(key, answer))
+                token = session.liveliness().declare_token(robot.keys.alive("twin", str(k)))
+                status = until(lambda n=name: (s := robot.status()) and n in s.peers and s, "it is seen")
+                if said:
+                    status = until(lambda: (s := robot.status()) and s.withheld and s, "it is refused")
+                    assert f"{name} is refused" in status.withheld
+                    assert said in status.withheld
+                    until(lambda: not robot.guard.permitted(), "nobody moves on its numbers")
+                else:
+                    time.sleep(0.3)
+                    assert robot.guard.permitted()
+                token.undeclare()
+                queryable.undeclare()
+            until(robot.guard.permitted, "it has left, the robot may move")
+
+
+def test_a_robot_on_rmw_zenoh_needs_no_bridge(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    text = CONFIG.replace("[live]", 'naming = "rmw_zenoh"\ndomain = 7\n\n[live]')
+    with supervisor(tmp_path, endpoint, text), open_link(LinkSettings("peer", (), (endpoint,))) as ros:
+        # what rmw_zenoh publishes: its key, CDR, its attachment
+        key = f"7/robot/left_gripper/state/{dds_name(GRIP)}/{rihs01(GRIP)}"
+        codec, grip = Codec(), GripState(True, 20.0, 5.0, 0.05, 20.0, 0.5, 0.0)
+        sequence = 0
+
+        def arrived() -> bool:
+            nonlocal sequence
+            for _ in range(5):
+                sequence += 1
+                now_ns = time.time_ns()
+                ros.put(key, codec.encode(grip, now_ns), attachment=pack_attachment(sequence, now_ns, bytes(range(16))))
+                time.sleep(0.01)
+            for reply in ros.get(Keys("robot").service("status"), timeout=2.0):
+                if reply.ok is not None:
+                    status = msgspec.json.decode(reply.ok.payload.to_bytes())
+                    return status["streams"]["robot/left_gripper/state"]["counts"]["samples"] > 0
+            return False
+
+        until(arrived, "its samples arrive")
+        # what it looks for to see us: a node and a subscription in the ROS graph
+        tokens = [str(r.ok.key_expr) for r in ros.liveliness().get("@ros2_lv/7/**", timeout=2.0) if r.ok is not None]
+        assert any(t.endswith("/0/0/NN/%/%/foreshock") for t in tokens)
+        assert any(f"/MS/%/%/foreshock/%robot%left_gripper%state/{dds_name(GRIP)}/{rihs01(GRIP)}/" in t for t in tokens)
