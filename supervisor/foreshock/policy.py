@@ -27,6 +27,7 @@ class ActionSpec(msgspec.Struct, frozen=True):
         may_worsen: precursor kinds in whose presence it may make things worse.
         mitigates: it softens the accident instead of preventing it.
         resumes: motion begins again when it is released, which is announced: an abrupt restart is itself a precursor.
+        stops: it freezes the robot; in the presence of a kind that it may worsen it topples a biped (rule 6).
         source: where it comes from.
     """
 
@@ -37,6 +38,7 @@ class ActionSpec(msgspec.Struct, frozen=True):
     may_worsen: tuple[str, ...] = ()
     mitigates: bool = False
     resumes: bool = False
+    stops: bool = False
     source: str = ""
 
 
@@ -205,6 +207,25 @@ class Arbiter:
             keep += [p for p in mitigate if p not in committed and time_to_event_s <= self.actions[p.action].duration_s]
         return keep + committed
 
+    def _upright(self, proposals: list[Proposal], present: frozenset[str]) -> list[Proposal]:
+        """Without the stops that would topple the robot, as long as something else is left that helps in time.
+
+        What is left is faster than the predicted accident: the proposals are feasible ones.
+        """
+        toppling = [p for p in proposals if self._topples(p, present)]
+        if not toppling:
+            return proposals
+        others = [
+            p
+            for p in proposals
+            if p not in toppling and p.action not in (*UNCONDITIONAL, ANNOUNCE) and not self.actions[p.action].mitigates
+        ]
+        return [p for p in proposals if p not in toppling] if others else proposals
+
+    def _topples(self, proposal: Proposal, present: frozenset[str]) -> bool:
+        spec = self.actions[proposal.action]
+        return spec.stops and not present.isdisjoint(spec.may_worsen)
+
     def _committed(self, state: ArbiterState, action: str, now_ns: int) -> bool:
         """Whether a mitigation has begun so lately that it is not given up: a prediction at its edge flickers."""
         since = state.engaged_ns.get(action)
@@ -252,7 +273,9 @@ class Arbiter:
         feasible = [
             p
             for mode in dict.fromkeys(p.mode for p in wanted)
-            for p in self.feasible(state, [p for p in wanted if p.mode == mode], now, situation.time_to(mode))
+            for p in self._upright(
+                self.feasible(state, [p for p in wanted if p.mode == mode], now, situation.time_to(mode)), present
+            )
         ]
         active: dict[str, Intervention] = {}
         engaged: dict[str, int] = {}

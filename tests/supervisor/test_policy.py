@@ -135,6 +135,28 @@ def test_an_action_that_is_wanted_again_during_its_release_is_announced_at_full_
     assert ("step-suppression", 1.0) in [(i.action, i.strength) for i in bench.changes]
 
 
+def test_a_stop_that_would_topple_the_robot_gives_way_to_what_is_faster_than_the_fall() -> None:
+    actions = {
+        **ACTIONS,
+        "freeze": ActionSpec("freeze", "", ("motion",), 0.1, may_worsen=("foot-micro-slip",), stops=True),
+    }
+    arbiter = Arbiter(actions, 0.1)
+    slip = Precursor("foot-micro-slip", "", "ongoing", 1.0, 1.0, 1.0, 0, "d")
+
+    def chosen(*wanted: str, tte: float | None = None, slipping: bool = True) -> set[str]:
+        seen = [slip] if slipping else []
+        _, held, _ = arbiter.step(ArbiterState(), situation(0, tte, seen), want(*wanted))
+        return {i.action for i in held}
+
+    assert chosen("freeze", "step-suppression", slipping=False) == {"freeze", "step-suppression"}
+    assert chosen("freeze", "step-suppression") == {"step-suppression"}
+    assert chosen("freeze", "step-suppression", tte=0.5) == {"step-suppression"}
+    # the step would come down too late: better to stop than to do nothing
+    assert chosen("freeze", "step-suppression", tte=0.12) == {"freeze"}
+    # neither a warning nor a slower speed keeps anybody upright
+    assert chosen("freeze", "announce", "speed-scale") == {"freeze", "announce", "speed-scale"}
+
+
 def test_people_are_warned_while_motion_resumes() -> None:
     bench = Bench(release_s=0.1)
     bench.tick(want("minimal-risk", "balance-lock"))

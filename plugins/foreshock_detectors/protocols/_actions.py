@@ -18,6 +18,7 @@ MODE_ACTIONS: tuple[ActionSpec, ...] = (
         0.3,
         may_worsen=BALANCE,
         resumes=True,
+        stops=True,
         source="ISO 10218-1, safety-rated monitored stop; IEC 60204-1 category 2",
     ),
     ActionSpec(
@@ -27,6 +28,7 @@ MODE_ACTIONS: tuple[ActionSpec, ...] = (
         0.3,
         may_worsen=BALANCE,
         resumes=True,
+        stops=True,
         source="ISO 10218-1, protective stop; IEC 60204-1 category 1",
     ),
     ActionSpec("retreat", "move away from people", ("motion",), 0.6, BALANCE, resumes=True, source="ISO 13482, 5.10"),
