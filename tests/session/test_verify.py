@@ -10,9 +10,9 @@ from foreshock.records import Intervention
 from foreshock.registry import Registry
 from foreshock.session.isolated import Failure, Job
 from foreshock.session.rates import per_hour, wilson
-from foreshock.session.run import Run
+from foreshock.session.run import Arm, Run
 from foreshock.session.scenario import find_scenario, scenario_ids
-from foreshock.session.verify import Cascade, ModeResult, _cascade, _held, _moved, plan_of, verify
+from foreshock.session.verify import Cascade, ModeResult, _cascade, _held, _judged, _moved, plan_of, verify
 from foreshock.twin import TwinEvent
 
 SECOND = 1_000_000_000
@@ -67,6 +67,21 @@ def test_always_on_is_every_action_at_its_strongest_from_the_start() -> None:
         Intervention(3 * SECOND, "speed-scale", 0.0),
     )
     assert [(i.stamp_ns, i.action, i.strength) for i in _held(run)] == [(0, "speed-scale", 0.7)]
+
+
+def test_an_accident_of_another_mode_is_harm_that_was_caused() -> None:
+    """A gripper that is opened too early drops what it holds; a touch is no accident."""
+    plan = plan_of("A4", scenario_ids(Registry()))
+    assert plan is not None
+    touch = TwinEvent(SECOND, "touch", "", 2.0, 1.0, "N")
+    drop = TwinEvent(2 * SECOND, "object-dropped", "A5", 1.0, 0.5, "1")
+
+    def seen(arm: Arm, *events: TwinEvent) -> Run:
+        return Run("s", "A4", arm, "p", 0, {}, False, "none", events, 10.0)
+
+    shadow, on, harmless = seen("shadow", touch), seen("on", touch, drop), [seen("on", drop), seen("on", touch)]
+    result = _judged(plan, 1, [shadow, on, *harmless], [seen("off"), seen("off")])
+    assert (result.supervised.k, result.caused, result.harmed) == (0, 1, 1)
 
 
 def test_what_was_never_run_misses_every_aim() -> None:

@@ -70,10 +70,10 @@ class ModeResult(msgspec.Struct, frozen=True):
         scenario: id of the scenario with the accident.
         unsupervised: shadow runs that ended in the accident.
         supervised: supervised ones.
-        caused: runs with the accident supervised and none unsupervised.
+        caused: runs with an accident of any mode supervised and none unsupervised: letting go may drop what is held.
         cascade: how the unsupervised accidents announced themselves.
         false: runs of harmless scenarios that reached the protective level and whose paired shadow run came to no harm.
-        harmed: runs of harmless scenarios, supervised, with an accident.
+        harmed: runs of harmless scenarios, supervised, with an accident of any mode.
         at_random: accidents with the same interventions begun at a random time.
         always: accidents with all of the actions held from the start.
         failures: runs that gave no result.
@@ -185,16 +185,21 @@ def _judged(plan: Plan, n: int, results: Sequence[Run | Failure], later: Sequenc
         plan.accident.id,
         unsupervised=_accidents(shadow),
         supervised=_accidents(on),
-        caused=sum(b.accident and not a.accident for a, b in pairs),
+        caused=sum(_harmed(b) and not _harmed(a) for a, b in pairs),
         cascade=_cascade(plan.mode, [r for r in shadow if isinstance(r, Run) and r.accident]),
         false=per_hour(
             sum(isinstance(r, Run) and not r.events for r in later[2 * n :]), sum(r.end_s for r in harmless) / 3600.0
         ),
-        harmed=sum(r.accident for r in harmless),
+        harmed=sum(_harmed(r) for r in harmless),
         at_random=_accidents(later[:n]),
         always=_accidents(later[n : 2 * n]),
         failures=sum(isinstance(r, Failure) for r in (*results, *later)),
     )
+
+
+def _harmed(run: Run) -> bool:
+    """Whether it ended in an accident of any mode."""
+    return any(e.mode for e in run.events)
 
 
 def _accidents(results: Sequence[Run | Failure]) -> Rate:
