@@ -29,7 +29,7 @@ void plan(Plant *self, const double *vars, double h) {
 
 /* One cycle of control. Work that does not fit waits in a queue: the command that comes out is as old as the queue is long
  * (Lindley's recursion of a single server). Active limits cost iterations of the active-set solver; a sagging bus slows
- * the clock. Both draws are made in every cycle, so that runs of one seed stay paired. */
+ * the clock. All three draws are made in every cycle, so that runs of one seed stay paired. */
 void control_cycle(Plant *self, const double *vars) {
     const double jitter = stream_normal(&self->process), rare = stream_normal(&self->process), drift = stream_normal(&self->process);
     const double *x = self->x;
