@@ -1,13 +1,24 @@
-"""Which command held when something was measured: commands are told at once, measurements arrive later."""
+"""What of an input is new, and which command held when something was measured: measurements arrive later."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
+from foreshock.detector import Inputs
 from foreshock.messages import AnyMessage
 from foreshock.records import Sample
 
-__all__ = ["Stamped"]
+__all__ = ["Stamped", "fresh"]
+
+
+def fresh(inputs: Inputs, name: str) -> Sequence[Sample]:
+    """What has arrived of an input; where nothing has, the newest, which may have come before the detector listened."""
+    new = inputs.new.get(name, ())
+    if new:
+        return new
+    sample = inputs.latest.get(name)
+    return () if sample is None else (sample,)
 
 
 class Stamped:

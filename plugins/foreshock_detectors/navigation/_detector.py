@@ -8,6 +8,7 @@ from typing import cast
 from foreshock.detector import Inputs
 from foreshock.messages import Humans, Odometry, PlannedPath
 from foreshock.records import Indication, Sample, SampleRef
+from foreshock_detectors._stamped import fresh
 from foreshock_detectors.navigation._config import NavigationConfig
 from foreshock_detectors.navigation._motion import Mover, place
 from foreshock_detectors.navigation._person import Person
@@ -49,7 +50,7 @@ class NavigationDetector:
         if own is None or people is None or path is None:
             return ()
         for name, mover in (("odometry", self._base), *self._limbs.items()):
-            for sample in self._fresh(inputs, name):
+            for sample in fresh(inputs, name):
                 mover.push(sample.stamp_ns, *_split(cast(Odometry, sample.value)))
             if mover.stamp_ns < 0:
                 return ()
@@ -58,7 +59,7 @@ class NavigationDetector:
             raise ValueError("plan/path: x, y and time_from_start must have one length, at least 1")
         news = path.stamp_ns != self._path_ns
         self._path_ns = path.stamp_ns
-        for sample in self._fresh(inputs, "humans"):
+        for sample in fresh(inputs, "humans"):
             news = self._take(sample) or news
         self._depart(now_ns)
         refs = (SampleRef(own.channel, own.stamp_ns), SampleRef(path.channel, path.stamp_ns))
@@ -76,14 +77,6 @@ class NavigationDetector:
         for name in absent:
             said += [Indication(kind, name, stamp, False, 0.0, limit, unit, 0.0, seen) for kind, limit, unit in KINDS]
         return said
-
-    def _fresh(self, inputs: Inputs, name: str) -> Sequence[Sample]:
-        """What has arrived of an input; the newest if it came before the detector listened."""
-        new = inputs.new.get(name, ())
-        if new:
-            return new
-        sample = inputs.latest.get(name)
-        return () if sample is None else (sample,)
 
     def _take(self, sample: Sample) -> bool:
         """People as seen; whether the message is newer than the last."""

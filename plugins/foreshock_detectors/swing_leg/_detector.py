@@ -7,8 +7,9 @@ from typing import cast
 
 from foreshock.detector import Inputs
 from foreshock.messages import MotionPlan, Odometry
-from foreshock.records import Indication, Sample, SampleRef
+from foreshock.records import Indication, SampleRef
 from foreshock_detectors._sequential import severity
+from foreshock_detectors._stamped import fresh
 from foreshock_detectors.swing_leg._config import SwingLegConfig
 from foreshock_detectors.swing_leg._foot import Foot
 
@@ -42,9 +43,9 @@ class SwingLegDetector:
         for name, foot in self._feet.items():
             if name not in inputs.latest or f"{name}-plan" not in inputs.latest:
                 continue
-            for sample in self._fresh(inputs, f"{name}-plan"):
+            for sample in fresh(inputs, f"{name}-plan"):
                 foot.planned(cast(Odometry, sample.value), sample.stamp_ns)
-            for sample in self._fresh(inputs, name):
+            for sample in fresh(inputs, name):
                 foot.measured(cast(Odometry, sample.value), sample.stamp_ns, name in support)
             if foot.stamp_ns < 0:
                 continue
@@ -67,7 +68,3 @@ class SwingLegDetector:
                 )
             )
         return said
-
-    def _fresh(self, inputs: Inputs, name: str) -> Sequence[Sample]:
-        """What has arrived of an input; the newest if it came before the detector listened."""
-        return inputs.new.get(name, ()) or (inputs.latest[name],)
