@@ -57,5 +57,5 @@ def _cells(scenario: Scenario, seeds: tuple[int, ...]) -> list[Cell]:
 def _print(name: str, results: list[CellResult], seeds: int) -> None:
     pairs = list(zip(results[::2], results[1::2], strict=True))
     columns = ("unsupervised", "supervised", "averted", "caused")
-    rows = [(a.cell.label, str(a.accidents), str(b.accidents), str(b.prevented), str(b.caused)) for a, b in pairs]
+    rows = [(a.cell.label, str(a.accidents), str(b.accidents), str(b.averted), str(b.added)) for a, b in pairs]
     table(f"{name}: accidents of {seeds} seeds", pairs[0][0].cell.factor, *columns, rows=rows, right=columns)

@@ -88,3 +88,8 @@ class Run(msgspec.Struct, frozen=True):
     digest: str = ""
     max_level: int = 0
     warnings: tuple[str, ...] = ()
+
+    @property
+    def harmed(self) -> bool:
+        """Whether an accident of any mode happened; a touch or a load put down is an event, and no accident."""
+        return any(e.mode for e in self.events)

@@ -17,6 +17,9 @@ from foreshock.session.scenario import Scenario
 
 __all__ = ["ArmSpec", "Cell", "CellResult", "sweep"]
 
+NOTHING = Rate(0, 0, 0.0, 1.0)
+"""Of no runs."""
+
 
 class ArmSpec(msgspec.Struct, frozen=True):
     """An arm: label, whether the supervisor acts, and by which policy."""
@@ -48,6 +51,8 @@ class CellResult(msgspec.Struct, frozen=True):
         false_interventions: of the runs unharmed unsupervised, those that reached the protective level here.
         lead_s: time from the protective gate to the unsupervised event, one per run that had both; negative: too late.
         failures: runs that gave no result.
+        averted: of the runs with the accident unsupervised, those without it here.
+        added: runs with an accident of any mode here and none unsupervised.
     """
 
     cell: Cell
@@ -59,6 +64,8 @@ class CellResult(msgspec.Struct, frozen=True):
     false_interventions: Rate
     lead_s: tuple[float, ...]
     failures: int
+    averted: Rate = NOTHING
+    added: int = 0
 
 
 def sweep(
@@ -101,6 +108,7 @@ def _judge(
 ) -> CellResult:
     runs = {seed: r for seed, r in mine.items() if isinstance(r, Run)}
     pairs = [(runs[s], ref) for s, ref in reference.items() if s in runs and isinstance(ref, Run)]
+    hit = [r for r, ref in pairs if ref.accident]
     harmed = [(r, ref) for r, ref in pairs if ref.events]
     unharmed = [(r, ref) for r, ref in pairs if not ref.events]
     acted = sum(r.max_level >= ProtectionLevel.PROTECTIVE for r, _ in unharmed)
@@ -115,4 +123,6 @@ def _judge(
         wilson(acted, len(unharmed)),
         tuple(leads),
         len(mine) - len(runs),
+        wilson(sum(not r.accident for r in hit), len(hit)),
+        sum(r.harmed and not ref.harmed for r, ref in pairs),
     )

@@ -185,21 +185,16 @@ def _judged(plan: Plan, n: int, results: Sequence[Run | Failure], later: Sequenc
         plan.accident.id,
         unsupervised=_accidents(shadow),
         supervised=_accidents(on),
-        caused=sum(_harmed(b) and not _harmed(a) for a, b in pairs),
+        caused=sum(b.harmed and not a.harmed for a, b in pairs),
         cascade=_cascade(plan.mode, [r for r in shadow if isinstance(r, Run) and r.accident]),
         false=per_hour(
             sum(isinstance(r, Run) and not r.events for r in later[2 * n :]), sum(r.end_s for r in harmless) / 3600.0
         ),
-        harmed=sum(_harmed(r) for r in harmless),
+        harmed=sum(r.harmed for r in harmless),
         at_random=_accidents(later[:n]),
         always=_accidents(later[n : 2 * n]),
         failures=sum(isinstance(r, Failure) for r in (*results, *later)),
     )
-
-
-def _harmed(run: Run) -> bool:
-    """Whether it ended in an accident of any mode."""
-    return any(e.mode for e in run.events)
 
 
 def _accidents(results: Sequence[Run | Failure]) -> Rate:
