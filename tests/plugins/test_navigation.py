@@ -11,7 +11,7 @@ from crossing_walkers import RADIUS_M, Place, encounter, straight
 
 from foreshock.detector import Inputs
 from foreshock.errors import ConfigError
-from foreshock.messages import PlannedPath
+from foreshock.messages import Humans, PlannedPath
 from foreshock.records import Indication, Sample
 from foreshock_detectors import navigation
 from foreshock_detectors.navigation import NavigationConfig
@@ -146,6 +146,52 @@ def test_one_who_goes_out_of_sight_is_predicted_on_and_then_has_left() -> None:
     assert at[4.9][OVERLAPS].present
     subjects = [said[CONVERGES].subject for t, said in history if t > 3.9 + config.coast_s]
     assert set(subjects) <= {"human-1"}
+
+
+def unmeasured(samples: Sequence[Sample]) -> list[Sample]:
+    """The same from a tracker that reports no velocity."""
+
+    def without(value: Humans) -> Humans:
+        return Humans(tuple(msgspec.structs.replace(h, velocity=None) for h in value.humans))
+
+    return [msgspec.structs.replace(s, value=without(s.value)) if isinstance(s.value, Humans) else s for s in samples]
+
+
+def test_one_who_steps_out_close_by_is_judged_at_once_by_his_reported_velocity() -> None:
+    """He comes into view at 5.0 s, 1 s before they meet: the dwell times of 0.04 s and 0.12 s remain."""
+    samples = encounter(ROBOT, across(), 5.6, sight=lambda t: t > 4.99)
+    history = play(samples)
+    seen = next(t for t, said in history if said and said[FAST].subject)
+    assert all(set(said) == set(SPEC.kinds) for t, said in history if t >= seen)
+    first = found(samples)
+    assert first[FAST] - seen < 0.1
+    assert first[OVERLAPS] - seen < 0.18
+
+
+def test_what_rests_on_a_velocity_that_is_not_known_yet_is_unobserved() -> None:
+    history = play(unmeasured(encounter(ROBOT, across(), 5.8, sight=lambda t: t > 4.99)))
+    unknown = [t for t, said in history if set(said) == {NARROW}]
+    assert unknown[0] == pytest.approx(5.0, abs=0.04)
+    assert unknown[-1] - unknown[0] == pytest.approx(2.0 * NavigationConfig().velocity_time_s, abs=0.05)
+    later = [said for t, said in history if t > unknown[-1]]
+    assert all(set(said) == set(SPEC.kinds) for said in later)
+    assert later[-1][FAST].present
+
+
+def test_nobody_is_absent_beside_one_whose_velocity_is_not_known_yet() -> None:
+    """A second human, far aside, appears without a velocity at 2 s."""
+    samples = encounter(ROBOT, straight(0.0, 9.0, 0.0, 0.0), 3.0)
+    other = unmeasured(encounter(ROBOT, straight(0.0, -9.0, 0.0, 0.0), 3.0, sight=lambda t: t > 1.99))
+    both = []
+    for s, o in zip(samples, other, strict=True):
+        value = s.value
+        if isinstance(value, Humans) and isinstance(o.value, Humans):
+            second = tuple(msgspec.structs.replace(h, id="human-2") for h in o.value.humans)
+            value = Humans(value.humans + second)
+        both.append(msgspec.structs.replace(s, value=value))
+    partial = [t for t, said in play(both) if set(said) == {NARROW}]
+    assert partial[0] == pytest.approx(2.0, abs=0.04)
+    assert partial[-1] == pytest.approx(2.4, abs=0.06)
 
 
 def test_nobody_there_is_absence_and_a_missing_input_is_not() -> None:

@@ -26,7 +26,9 @@ KINDS = (
 class NavigationDetector:
     """Implements foreshock.detector.Detector.
 
-    Somebody who is out of sight is predicted on for a while: who walked behind a rack is still there.
+    Somebody who is out of sight is predicted on for a while: who walked behind a rack is still there. While somebody's
+    velocity is not known yet, the kinds that rest on it are left out, except where another's is present, so that they
+    count as unobserved.
     """
 
     def __init__(self, config: NavigationConfig) -> None:
@@ -44,7 +46,7 @@ class NavigationDetector:
         self._humans_ns = self._path_ns = -1
 
     def update(self, now_ns: int, inputs: Inputs) -> Sequence[Indication]:
-        """Four indications per human; about ``""`` while nobody is there."""
+        """Four indications per human whose velocity is known; about ``""`` while nobody is there."""
         latest = inputs.latest
         own, people, path = latest.get("odometry"), latest.get("humans"), latest.get("path")
         if own is None or people is None or path is None:
@@ -76,6 +78,8 @@ class NavigationDetector:
         seen = (SampleRef(people.channel, people.stamp_ns),)
         for name in absent:
             said += [Indication(kind, name, stamp, False, 0.0, limit, unit, 0.0, seen) for kind, limit, unit in KINDS]
+        if not all(person.mover.known() for person in self._people.values()):
+            said = [i for i in said if i.present or i.kind == "narrow-shared-space"]
         return said
 
     def _take(self, sample: Sample) -> bool:

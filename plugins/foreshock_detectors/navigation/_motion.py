@@ -64,15 +64,16 @@ def discs(pose: HumanPose, regions: Sequence[str]) -> tuple[float, float, float,
 class Mover:
     """Filtered position and velocity of a body.
 
-    The velocity is the measured one through a first-order filter; where none is measured, that of the positions. It is
-    known after two time constants. A measurement of little weight moves both only a little off the prediction.
+    The velocity is the measured one through a first-order filter that starts at its first value, and so known at once;
+    where none is measured, that of the positions, which is known after two time constants. A measurement of little
+    weight moves both only a little off the prediction.
     """
 
-    __slots__ = ("_first_ns", "_time_ns", "stamp_ns", "vx", "vy", "x", "y")
+    __slots__ = ("_known_ns", "_time_ns", "stamp_ns", "vx", "vy", "x", "y")
 
     def __init__(self, time_s: float) -> None:
         self._time_ns = time_s * 1e9
-        self.stamp_ns = self._first_ns = -1
+        self.stamp_ns = self._known_ns = -1
         self.x = self.y = self.vx = self.vy = 0.0
 
     def push(
@@ -82,8 +83,8 @@ class Mover:
         dt = stamp_ns - self.stamp_ns
         if self.stamp_ns >= 0 and dt <= 0:
             return
-        if self.stamp_ns < 0 or dt > 10.0 * self._time_ns:
-            self._first_ns = stamp_ns
+        if self.stamp_ns < 0 or dt > 10.0 * self._time_ns or (velocity is not None and not self.known()):
+            self._known_ns = stamp_ns + (0 if velocity is not None else round(2.0 * self._time_ns))
             self.vx, self.vy = velocity or (0.0, 0.0)
             self.x, self.y = x, y
         else:
@@ -96,8 +97,8 @@ class Mover:
         self.stamp_ns = stamp_ns
 
     def known(self) -> bool:
-        """Whether the velocity has settled."""
-        return self.stamp_ns - self._first_ns >= 2.0 * self._time_ns
+        """Whether the velocity has been measured or has settled."""
+        return 0 <= self._known_ns <= self.stamp_ns
 
     def at(self, now_ns: int) -> tuple[float, float]:
         """Position at now_ns by constant velocity (m)."""

@@ -1,4 +1,4 @@
-"""One human and the four verdicts on him."""
+"""One human and the verdicts on him."""
 
 from __future__ import annotations
 
@@ -21,6 +21,11 @@ __all__ = ["Person"]
 
 class Person:
     """Follows one track.
+
+    Where he is, is known with his first sample, and so is how he moves if the tracker reports it. If it does not, his
+    velocity takes two time constants of its filter (0.4 s by default), and what rests on it is not judged before. That
+    is longer than trust.grace_s (0.3 s by default): somebody new brings the minimal risk condition for a tenth of a
+    second. To avoid it, report HumanPose.velocity.
 
     Attributes:
         id: of the track.
@@ -68,29 +73,32 @@ class Person:
     def judge(
         self, base: Mover, limbs: Mapping[str, Mover], refs: tuple[SampleRef, ...], now_ns: int
     ) -> tuple[Indication, ...]:
-        """The four indications now."""
+        """The indications now: narrow-shared-space, and the other three once his velocity is known."""
         config, mover = self._config, self.mover
         (x, y), (rx, ry) = mover.at(now_ns), base.at(now_ns)
         meeting = encounter(
             x - rx, y - ry, mover.vx - base.vx, mover.vy - base.vy, self._radius + config.robot_radius_m
         )  # fmt: skip
-        if mover.known():
-            self._convergence.push(meeting, now_ns)
-            self._approach.push(meeting, now_ns)
-            overlapping = self._overlap.push(config.gap_s - min(self._gap_s, 10.0), now_ns)
-        else:
-            overlapping = False
         gap_m, free_m = self._room(x, y, rx, ry, limbs, now_ns)
         lack_m = max(config.free_least_m - gap_m, config.walled_least_m - free_m)
         narrow = self._narrow.push(max(lack_m, -10.0), now_ns)
         stamp, evidence = max(r.stamp_ns for r in (self.ref, *refs)), (self.ref, *refs)
+        full = config.free_least_m
+        room = Indication(
+            "narrow-shared-space", self.id, stamp, narrow, max(lack_m, -10.0), 0.0, "m",
+            severity(lack_m, 0.0, full) if narrow else 0.0, evidence,
+        )  # fmt: skip
+        if not mover.known():
+            return (room,)
         c, a = self._convergence, self._approach
+        c.push(meeting, now_ns)
+        a.push(meeting, now_ns)
+        gap_s, least = min(self._gap_s, 10.0), config.gap_s
+        overlapping = self._overlap.push(least - gap_s, now_ns)
         measures = {
             "miss_m": meeting.miss_m, "time_s": meeting.time_s, "gap_m": meeting.gap_m,
             "closing_m_s": meeting.closing_m_s,
         }  # fmt: skip
-        gap_s, least = min(self._gap_s, 10.0), config.gap_s
-        full = config.free_least_m
         return (
             Indication(
                 "path-convergence", self.id, stamp, c.present, c.statistic, 1.0, "1",
@@ -104,10 +112,7 @@ class Person:
                 "high-approach-speed", self.id, stamp, a.present, a.speed_m_s, a.allowed_m_s, "m/s",
                 severity(a.speed_m_s, a.allowed_m_s, 2.0 * a.allowed_m_s) if a.present else 0.0, evidence,
             ),
-            Indication(
-                "narrow-shared-space", self.id, stamp, narrow, max(lack_m, -10.0), 0.0, "m",
-                severity(lack_m, 0.0, full) if narrow else 0.0, evidence,
-            ),
+            room,
         )  # fmt: skip
 
     def _room(
