@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import msgspec
 import numpy as np
 import pytest
 from people_scene import MS, PERIOD_MS, scene, straight
 
 from foreshock.detector import Inputs
 from foreshock.errors import ConfigError
-from foreshock.messages import Odometry
+from foreshock.messages import Capsule, HumanPose, Humans, Odometry
 from foreshock.records import Indication, Sample
 from foreshock_detectors import people
 from foreshock_detectors.people import PeopleConfig
@@ -120,6 +121,27 @@ def test_closed_eyes_without_confidence_are_unobserved_and_a_blink_changes_nothi
 def test_without_gaze_its_kinds_are_unobserved_and_the_others_are_not() -> None:
     history = play([s for s in scene(2.0) if s.channel != "talos/human-1/gaze"])
     assert set(history[-1][1]) == {REACH, LOWER}
+
+
+def also(samples: Sequence[Sample], x: float, name: str = "human-2") -> list[Sample]:
+    """The same with another, who stands at x (m)."""
+    other = Capsule("face", (x, 0.0, 1.6), (x, 0.0, 1.7), 0.1), Capsule("hand", (x, 0.3, 0.8), (x, 0.3, 0.8), 0.05)
+    return [
+        msgspec.structs.replace(s, value=Humans((*s.value.humans, HumanPose(name, other))))
+        if isinstance(s.value, Humans)
+        else s
+        for s in samples
+    ]
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_beside_somebody_without_a_gaze_channel_the_gaze_is_unobserved_and_not_absent(alone: bool) -> None:
+    samples = scene(2.0, there=lambda t: not alone)
+    near, far = play(also(samples, 0.9)), play(also(samples, 4.0))
+    assert all(set(said) == {REACH, LOWER} for t, said in near if t > 0.15)
+    assert all(set(said) == set(SPEC.kinds) for t, said in far if t > 0.15)
+    diverted = play(also(scene(4.0, angle=lambda t: 1.2), 0.9))
+    assert diverted[-1][1][DIVERT].present  # what is seen of another is said
 
 
 # --- posture

@@ -55,7 +55,10 @@ class PeopleDetector:
         found: list[Indication] = []
         for human, body in self._bodies.items():
             found += self._posture(human, body)
-        missing = False
+        configured = self._attention.keys()
+        missing = any(
+            body.distance_m <= self._config.shared_m for human, body in self._bodies.items() if human not in configured
+        )
         for name, human in self._config.gazes:
             tracked = self._bodies.get(human)
             if tracked is None:
