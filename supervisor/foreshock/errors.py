@@ -23,7 +23,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
     close = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
     if close:
         return "; did you mean " + " or ".join(repr(c) for c in close) + "?"
-    if 0 < len(names) <= 12:
+    if 0 < len(names) <= 20:
         return "; known: " + ", ".join(names)
     return ""
 
