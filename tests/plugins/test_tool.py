@@ -131,6 +131,30 @@ def test_look_alikes_of_an_unsafe_orientation(
     assert ORIENTATION not in present(history)
 
 
+def with_another(samples: Sequence[Sample], other: HumanPose) -> list[Sample]:
+    return [
+        msgspec.structs.replace(s, value=Humans((*s.value.humans, other))) if isinstance(s.value, Humans) else s
+        for s in samples
+    ]
+
+
+@pytest.mark.parametrize(("x", "found"), [(1.4, {ORIENTATION}), (1.8, set())])
+def test_a_tool_that_points_at_the_second_nearest_is_unsafe_if_he_is_within_reach(x: float, found: set[str]) -> None:
+    """The nearest stands 0.35 m aside, another in the line of the tool: 0.55 m ahead, or 0.95 m."""
+    ahead = HumanPose("other", (Capsule("chest", (x, 0.0, 0.9), (x, 0.0, 1.5), 0.15),))
+    history = play(with_another(stream(2.0, human_y=lambda t: 0.5), ahead))
+    assert present(history) == found
+    if found:
+        measures = history[-1][1][ORIENTATION].measures
+        assert measures["distance_m"] == pytest.approx(x - 0.7 - 0.15, abs=0.01)
+
+
+def test_beside_a_human_without_capsules_orientation_is_unobserved_unless_another_makes_it_unsafe() -> None:
+    nowhere = HumanPose("other", ())
+    assert set(play(with_another(stream(2.0), nowhere))[-1][1]) == {TIP, STABILITY}
+    assert present(play(with_another(stream(2.0, human_x=1.3, human_y=lambda t: 0.0), nowhere))) == {ORIENTATION}
+
+
 def test_distance_to_capsules_and_axis_agree_with_dense_sampling_and_matrices() -> None:
     from scipy.spatial.transform import Rotation
 
@@ -140,12 +164,12 @@ def test_distance_to_capsules_and_axis_agree_with_dense_sampling_and_matrices() 
         points = a + np.linspace(0.0, 1.0, 20_001)[:, None] * (b - a)
         least = float(np.linalg.norm(points - tip, axis=1).min())
         capsule = Capsule("chest", tuple(a.tolist()), tuple(b.tolist()), 0.1)
-        found = nearest((HumanPose("h", (capsule,), uncertainty=0.05),), tuple(tip.tolist()))
+        found = nearest(HumanPose("h", (capsule,), uncertainty=0.05), tuple(tip.tolist()))
         assert found is not None
         assert found[0] == pytest.approx(least - 0.15, abs=1e-6)
         turn = Rotation.from_rotvec(rng.normal(size=3))
         assert axis(tuple(turn.as_quat())) == pytest.approx(turn.apply((1.0, 0.0, 0.0)), abs=1e-9)
-    assert nearest((), (0.0, 0.0, 0.0)) is None
+    assert nearest(HumanPose("h", ()), (0.0, 0.0, 0.0)) is None
     assert axis((0.0, 0.0, 0.0, 0.0)) is None
 
 
