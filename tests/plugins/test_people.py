@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
 import numpy as np
@@ -65,6 +65,42 @@ def test_a_hand_faster_than_iso_13855_is_a_rapid_reach_in(speed: float, found: s
 def test_a_hand_drawn_back_as_fast_is_none() -> None:
     history = play(scene(4.0, hand=lambda t: (0.25 + min(0.65, 3.0 * max(0.0, t - 2.0)), 0.0, 1.0)))
     assert present(history) == set()
+
+
+def two_hands(samples: Sequence[Sample], kept: Callable[[float], Sequence[int]]) -> list[Sample]:
+    """The same with a second hand, 0.25 m nearer to the workspace; of both, those that kept(t) gives, in its order."""
+
+    def hands(t: float, human: HumanPose) -> HumanPose:
+        head, hand = human.capsules
+        (x, y, z) = hand.a
+        near = msgspec.structs.replace(hand, a=(x - 0.25, y, z), b=(x - 0.25, y, z))
+        return msgspec.structs.replace(human, capsules=(head, *[(hand, near)[i] for i in kept(t)]))
+
+    return [
+        msgspec.structs.replace(s, value=Humans(tuple(hands(s.stamp_ns * 1e-9, h) for h in s.value.humans)))
+        if isinstance(s.value, Humans)
+        else s
+        for s in samples
+    ]
+
+
+@pytest.mark.parametrize("kept", [lambda t: (0, 1) if t < 2.0 else (1,), lambda t: (0, 1) if t < 2.0 else (1, 0)])
+def test_a_hand_that_is_lost_or_listed_in_another_place_has_not_moved(kept: Callable[[float], Sequence[int]]) -> None:
+    still = scene(4.0, hand=lambda t: (0.7, 0.0, 1.0))
+    history = play(two_hands(still, kept))
+    assert present(history) == set()
+    silent = [t for t, said in history if t > 0.15 and REACH not in said]
+    assert len(silent) <= 3  # the new estimate needs 60 ms
+
+
+def test_the_other_hand_is_found_to_reach_in_whatever_the_order() -> None:
+    moving = scene(4.0, hand=straight(2.0, 3.0))
+    assert present(play(two_hands(moving, lambda t: (0, 1) if round(50.0 * t) % 2 else (1, 0)))) == {REACH}
+
+
+def test_without_a_tracked_hand_a_reach_in_is_unobserved_where_it_matters() -> None:
+    assert set(play(two_hands(scene(2.0), lambda t: ()))[-1][1]) == {DIVERT, NEGLECT, LOWER}
+    assert set(play(two_hands(scene(2.0, x=lambda t: 4.0), lambda t: ()))[-1][1]) == set(SPEC.kinds)
 
 
 def test_a_fast_hand_far_from_the_workspace_is_none() -> None:

@@ -39,6 +39,7 @@ def foreshock_detectors() -> Sequence[DetectorSpec]:
             inputs=inputs,
             build=_build,
             config=PeopleConfig,
+            warm_up_s=0.1,
             summary="what a human does beside the robot: reaching in fast, looking away, not looking, crouching",
         ),
     )

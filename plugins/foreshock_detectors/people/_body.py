@@ -26,6 +26,7 @@ class Body:
         head: middle of the head, or of all capsules if no head is tracked (m).
         distance_m: horizontal, trunk to the workspace's centre.
         hand_m_s: speed of the faster hand towards the workspace, 0 beyond reach.
+        hands_judged: whether that speed is known of every hand that is tracked, of one at least.
         lowered_m: head below its standing height.
         reaching: verdict.
         lowered: verdict.
@@ -36,14 +37,14 @@ class Body:
         hold_ns = round(config.hold_s * 1e9)
         self._reach = Hysteresis(config.reach_m_s, LEAST_RELEASE * config.reach_m_s, hold_ns)
         self._lower = Hysteresis(config.lowering_m, config.lowering_release_m, hold_ns, round(config.lowering_s * 1e9))
-        self._hands: list[deque[tuple[float, float]]] = []
+        self._hands: list[tuple[Vec3, deque[tuple[float, float]]]] = []
         self._window_s = config.reach_window_s + 1e-6
         self._stature_m = math.nan
         self._before_m = self._last_m = math.nan
         self.stamp_ns = -1
         self.head: Vec3 = (0.0, 0.0, 0.0)
         self.distance_m, self.hand_m_s, self.lowered_m = math.inf, 0.0, 0.0
-        self.reaching = self.lowered = False
+        self.reaching = self.lowered = self.hands_judged = False
 
     def push(self, stamp_ns: int, pose: HumanPose, centre: Vec3) -> None:
         """The next pose; centre of the workspace in the pose's frame."""
@@ -61,17 +62,21 @@ class Body:
         self.lowered = self._lower.push(self.lowered_m, stamp_ns)
 
     def _hand_speed(self, t_s: float, hands: list[Capsule], centre: Vec3) -> float:
-        """Least squares slope of the distance to the workspace, the fastest hand within reach of it."""
+        """Least squares slope of the distance to the workspace, the fastest hand within reach of it.
+
+        A hand is the nearest of those before. Where another number of hands is tracked, nobody knows which one is new,
+        and all slopes begin anew.
+        """
         config, fastest = self._config, 0.0
-        while len(self._hands) < len(hands):
-            self._hands.append(deque())
-        for track, hand in zip(self._hands, hands, strict=False):
-            a, b = hand.a, hand.b
-            track.append((t_s, math.dist((0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])), centre)))
+        self._hands = _followed(self._hands, [_middle([hand]) for hand in hands])
+        self.hands_judged = bool(hands)
+        for place, track in self._hands:
+            track.append((t_s, math.dist(place, centre)))
             while track[0][0] < t_s - self._window_s:
                 track.popleft()
-            spans = len(track) >= 3 and t_s - track[0][0] >= LEAST_SPAN * config.reach_window_s
-            if spans and track[-1][1] - config.workspace_radius_m <= config.reach_within_m:
+            if len(track) < 3 or t_s - track[0][0] < LEAST_SPAN * config.reach_window_s:
+                self.hands_judged = False
+            elif track[-1][1] - config.workspace_radius_m <= config.reach_within_m:
                 speed = -_slope(track)
                 if speed > fastest:
                     fastest = speed
@@ -91,6 +96,20 @@ class Body:
         else:
             self._stature_m += (middle - self._stature_m) * min(1.0, dt_s / self._config.stature_time_s)
         return self._stature_m - middle
+
+
+def _followed(
+    before: list[tuple[Vec3, deque[tuple[float, float]]]], places: list[Vec3]
+) -> list[tuple[Vec3, deque[tuple[float, float]]]]:
+    """Each place with the track of the hand that was nearest, nearest pair first; new tracks if the numbers differ."""
+    if len(before) != len(places):
+        return [(place, deque()) for place in places]
+    old, new = list(before), list(places)
+    found = []
+    while new:
+        _, i, k = min([(math.dist(place, old[k][0]), i, k) for i, place in enumerate(new) for k in range(len(old))])
+        found.append((new.pop(i), old.pop(k)[1]))
+    return found
 
 
 def _middle(capsules: list[Capsule]) -> Vec3:

@@ -26,7 +26,8 @@ class PeopleDetector:
     """Implements foreshock.detector.Detector.
 
     Kinds of the gaze are said of configured humans only; a human in the shared space whose gaze is not measured leaves
-    them out, except where another's is present, so that they count as unobserved.
+    them out, except where another's is present, so that they count as unobserved. So does a human there of whom no hand
+    is tracked, or one whose speed is not known yet (60 ms with the default window), with rapid-reach-in.
     """
 
     def __init__(self, config: PeopleConfig) -> None:
@@ -82,9 +83,10 @@ class PeopleDetector:
             found += self._absent("")
         elif not any(human in self._bodies or human in self._left for human in self._config.humans):
             found += self._absent("")[2:]
-        if missing:
-            found = [i for i in found if i.present or i.kind not in ("gaze-diversion", "human-inattentiveness")]
-        return found
+        silent = {"gaze-diversion", "human-inattentiveness"} if missing else set()
+        if any(b.distance_m <= self._config.shared_m and not b.hands_judged for b in self._bodies.values()):
+            silent.add("rapid-reach-in")
+        return [i for i in found if i.present or i.kind not in silent] if silent else found
 
     def _centre(self, inputs: Inputs) -> Vec3:
         """Of the workspace, in odom: turned about the vertical with the base where it moves with it."""
