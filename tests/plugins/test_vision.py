@@ -15,6 +15,7 @@ from foreshock.records import Indication, Sample
 from foreshock.testing import Rig
 from foreshock_detectors import vision
 from foreshock_detectors.vision import VisionConfig
+from foreshock_detectors.vision._image import LEARNT
 
 SPEC = vision.foreshock_detectors()[0]
 TRACKS = tuple(k for k in SPEC.kinds if k != "visual-degradation")
@@ -183,6 +184,15 @@ def test_fog_that_takes_contrast_is_degradation_long_before_nothing_is_seen() ->
 def test_blur_and_glare_are_degradation() -> None:
     assert present(played(pictures(5.0, sharpness=step(3.0, 0.8, 0.4)))).keys() == {"visual-degradation"}
     assert present(played(pictures(5.0, saturated=step(3.0, 0.01, 0.5)))).keys() == {"visual-degradation"}
+
+
+def test_until_the_reference_is_learnt_the_limits_alone_judge_and_the_warm_up_covers_it() -> None:
+    """From the first image on nothing can be seen; or half of the contrast is lost just after it is learnt."""
+    dark = played(pictures(0.4, contrast=always(0.04)))
+    assert dark[0][0] == pytest.approx(0.06)  # the median of three: before, unobserved
+    assert all(i.present for _, i in dark)
+    assert present(played(pictures(3.0, contrast=step(LEARNT / 50.0 + 0.01, 0.25, 0.12)))) != {}
+    assert SPEC.warm_up_s >= LEARNT / 50.0  # frame_s is 0.02
 
 
 def test_a_lamp_one_black_frame_and_a_slow_dusk_are_not() -> None:

@@ -43,7 +43,7 @@ def foreshock_detectors() -> Sequence[DetectorSpec]:
             inputs=inputs,
             build=_build,
             config=VisionConfig,
-            warm_up_s=0.3,
+            warm_up_s=0.65,
             summary="occlusion, confidence, identity and class of tracked detections; quality of the camera image",
             reports=lambda config: config.kinds,
         ),

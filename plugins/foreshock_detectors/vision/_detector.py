@@ -24,7 +24,8 @@ class VisionDetector:
 
     Kinds about a track have the track's id as subject, kinds about the whole view the camera's name; in an empty scene
     the camera is the subject of all, and all are absent. A track that has gone is reported absent for as long as it had
-    been reported. While the last frame is malformed, nothing is said of tracks.
+    been reported. While the last frame is malformed, nothing is said of tracks, and before the third image nothing of
+    visual degradation; until its reference is learnt, by the end of the warm-up at 50 Hz, its limits judge alone.
     """
 
     def __init__(self, config: VisionConfig) -> None:
@@ -69,7 +70,7 @@ class VisionDetector:
             for answer in self._answers:
                 said += answer(self._frame)
             self._depart(said, self._frame)
-        if "statistics" in inputs.latest and self._picture is not None:
+        if "statistics" in inputs.latest and self._picture is not None and self._image.judged:
             said.append(self._degraded(self._picture))
         return said
 

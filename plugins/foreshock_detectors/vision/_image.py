@@ -2,13 +2,13 @@
 
 Contrast behind a layer of optical depth tau is C exp(-tau) (Koschmieder's law). Two ways to be degraded:
 limits (contrast, sharpness, luminance and saturation beyond which nothing can be recognised; in the median of three
-frames), and a loss relative to
-what this camera has shown lately: a CUSUM of
+frames), and a loss relative to what this camera has shown lately: a CUSUM of
 
     z = (median - x) / max(unit * median, robust sigma),    G <- max(0, G + z - tolerated)
 
 of contrast and of sharpness, so that losses below tolerated * unit of the median never add up. A lamp that is switched
-changes the luminance and leaves both as they were.
+changes the luminance and leaves both as they were. What the camera shows is learnt from LEARNT images; before, the
+limits alone judge, and before the third image nothing does.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ from foreshock.messages import ImageStatistics
 from foreshock_detectors._sequential import Cusum, Hysteresis, RunningMedian, cusum_threshold
 from foreshock_detectors.vision._config import VisionConfig
 
-__all__ = ["ImageQuality"]
+__all__ = ["LEARNT", "ImageQuality"]
+
+LEARNT = 31
+"""Images until their median is known: 0.62 s at 50 Hz."""
 
 SIGMA_PER_MAD = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution: 1 / Phi^-1(3/4)."""
@@ -39,6 +42,7 @@ class ImageQuality:
     """Judges the statistics of one camera image after another.
 
     Attributes:
+        judged: whether there have been enough images to say anything.
         statistic: largest of limit over contrast and the like, and of CUSUM over its threshold; degraded at 1.
         degraded: the verdict, with hysteresis.
     """
@@ -50,9 +54,10 @@ class ImageQuality:
             cusum_threshold(config.false_alarm_s / config.frame_s, config.image_tolerated),
         )
         self._tests = tuple(
-            (RunningMedian(LEAST_MAD, GAIN), Cusum(config.image_tolerated, threshold, CLIP)) for _ in range(2)
+            (RunningMedian(LEAST_MAD, GAIN, LEARNT), Cusum(config.image_tolerated, threshold, CLIP)) for _ in range(2)
         )
-        self._recent = [0.0, 0.0, 0.0]
+        self._recent: list[float] = []
+        self.judged = False
         self.statistic = 0.0
         self.degraded = Hysteresis(1.0, 0.5, round(config.hold_s * 1e9))
 
@@ -77,9 +82,12 @@ class ImageQuality:
             image.saturated / config.saturated_most,
         )
         recent = self._recent
-        recent.pop(0)
         recent.append(limit)
+        if len(recent) < 3:
+            return
+        self.judged = True
         limit = sorted(recent)[1]
+        recent.pop(0)
         worst = limit if limit > worst else worst
         self.statistic = worst
         self.degraded.push(worst, stamp_ns)
