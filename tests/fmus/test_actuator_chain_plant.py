@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from plant_runner import Log, runner
 
@@ -58,14 +59,14 @@ def test_limp_arm_without_losses_keeps_its_energy() -> None:
 
 def test_drive_carries_the_weight_and_the_winding_warms_as_copper_does() -> None:
     """At rest: torque = weight, but for friction; V = E - R (I_rest + P / V); C T' = R i^2 - (T - T_a) / R_h."""
-    rest = {"sag": 0.0, "angle_low": 0.4, "angle_high": 0.4, "friction": 0.0, "hand_height": -9.0, "heat_start": 25.0}
+    rest = {"sag": 0.0, "angle_low": 0.4, "angle_high": 0.4, "friction": 0.0, "hand_height": -9.0, "heat_start": 298.15}
     log = runner("actuator_chain").run(rest, 30.0, ("drive_torque", "heat", "volts", "angle"), h=0.02)
     weight = (4.9 * 0.2 + 4.0 * 0.55) * 9.81 * np.cos(log["angle"][-1])
     assert log["drive_torque"][-1] == pytest.approx(weight, rel=1e-3)
-    current, heat, cold, span = weight / 9.6, 25.0, 1.1, 1e-3
+    current, heat, cold, span = weight / 9.6, 298.15, 1.1, 1e-3
     for _ in range(30000):
-        loss = current**2 * cold * (1.0 + 0.0039 * (heat - 25.0))
-        heat += span * (loss - (heat - 25.0) / 1.6) / 45.0
+        loss = current**2 * cold * (1.0 + 0.0039 * (heat - 298.15))
+        heat += span * (loss - (heat - 298.15) / 1.6) / 45.0
     assert log["heat"][-1] == pytest.approx(heat, abs=0.02)
     volts = log["volts"][-1]
     assert volts == pytest.approx(50.4 - 0.12 * (14.0 + loss / volts), abs=1e-3)
@@ -117,8 +118,16 @@ def test_lost_cells_crush_the_hand_and_without_the_loss_it_is_safe() -> None:
     assert np.abs(safe["angle"] - safe["due_angle"]).max() < 0.02
 
 
+def test_temperatures_are_kelvin_as_their_unit_says() -> None:
+    """45, 110, 140 and 25 degrees Celsius; R_25 is that at 25 degrees Celsius."""
+    kelvin = [v for v in read_model_description(build_fmu("actuator_chain", 2)).modelVariables if v.unit == "K"]
+    celsius = {v.name: float(v.start) - 273.15 for v in kelvin if v.causality == "parameter" and v.name != "heat_noise"}
+    expected = {"heat_start": 45.0, "heat_fold": 110.0, "heat_most": 140.0, "ambient": 25.0}
+    assert celsius == pytest.approx(expected, abs=1e-9)  # rounding
+
+
 def test_hot_winding_is_another_way_to_the_same_end() -> None:
-    hot = sag(0.0, heat_start=132.0)
+    hot = sag(0.0, heat_start=405.15)
     assert hot["contact_force_peak"][-1] > 140.0
 
 

@@ -70,7 +70,7 @@ void chain_rhs(const Plant *self, const double *vars, const double x[X_SIZE], do
     dx[X_MOTOR_RATE] = (drive - rub - gear + brake_torque(self, vars, x[X_MOTOR], wm)) / vars[V_motor_inertia];
     dx[X_ARM_RATE] = (gear - weight_torque(vars, x[X_ARM]) + touch) / arm_inertia(vars);
     /* bus: a capacitor behind the battery's resistance; copper loss and shaft power of this motor, the rest of the robot */
-    const double resistance = vars[V_winding_resistance] * (1.0 + 0.0039 * (x[X_HEAT] - 25.0)), loss = i * i * resistance;
+    const double resistance = vars[V_winding_resistance] * (1.0 + 0.0039 * (x[X_HEAT] - 298.15)), loss = i * i * resistance;
     const double volts = x[X_VOLTS] > 5.0 ? x[X_VOLTS] : 5.0, shaft = drive * wm;
     const double rest = vars[V_rest_current] * (1.0 - vars[V_derate_rest] * self->derate) * (1.0 - vars[V_stop_rest] * self->stop);
     const double open = supply_volts(vars, ((double)self->step + 0.5) * vars[V_dt]); /* held over a step: its middle */
