@@ -3,7 +3,7 @@
 
 #include "model.h"
 
-/* Once per tick, two draws always: one drives the head's wandering, one is the dwell if a dwell begins now. */
+/* Once per tick, four draws always: the head's wandering, the dwell if one begins now, the mood that moves his threshold, his sway. */
 void gaze_tick(Plant *self, const double *vars, double t) {
     double wander = stream_normal(&self->process), dwell = stream_normal(&self->process);
     double mood = stream_normal(&self->process), sway = stream_normal(&self->process);
