@@ -43,6 +43,10 @@ class CoCarryConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         hold_s: how long a verdict stands after its reason has gone (s): longer than half a step.
         max_age_s: age at which an input is stale (s).
         min_rate_hz: least rate of wrench, load and grip (Hz); 0 does not check.
+
+    The false alarm rate of uneven-load-sharing follows from no theory, for the share is what partner and load make of
+    it. Measured is that of interventions, to which all kinds contribute: in 3.0 h of nominal and near-miss runs of the
+    plant co_carry, seeds from 30000, none was false, which bounds it at 1.23 per hour (exact Poisson, 95 %, two-sided).
     """
 
     subject: str = "load"
