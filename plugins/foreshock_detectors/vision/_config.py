@@ -75,6 +75,12 @@ class VisionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         hold_s: how long a verdict stands after its reason has gone (s).
         max_age_s: age at which an input is stale (s).
         min_rate_hz: least rate of the detections (Hz).
+
+    The false alarm rates of visual-occlusion and id-switching follow from no theory, for they are what the tracker
+    makes of the scene. They are measured on runs without any reason for them (exact Poisson bounds, 95 %, two-sided):
+    visual-occlusion was never present in 0.85 h of A6's nominal scenario (seeds 1 to 51), at most 4.3 per hour, and
+    id-switching never in 0.65 h of A8's (seeds 1 to 39), at most 5.7 per hour. In 3.0 h of nominal and near-miss runs
+    of A8, seeds from 30000, two interventions were false; class flips caused both. A8 does not report visual-occlusion.
     """
 
     kinds: tuple[str, ...] = KINDS
