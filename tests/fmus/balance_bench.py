@@ -60,7 +60,13 @@ class Bench:
             (Path(scratch) / "plant_vars.h").write_text(variables_header(self.plant))
             out = Path(scratch) / "bench.so"
             sources = [*sorted(FOLDER.glob("*.c")), HERE / "balance_batch.c"]
-            compile_library(find_compiler(), sources, [Path(scratch), FOLDER.parents[1] / "adapter", FOLDER.parents[1] / "common"], {}, out)
+            compile_library(
+                find_compiler(),
+                sources,
+                [Path(scratch), FOLDER.parents[1] / "adapter", FOLDER.parents[1] / "common"],
+                {},
+                out,
+            )
             return ctypes.CDLL(str(out))
 
     def _pointer(self, array: Array) -> ctypes.c_void_p:
