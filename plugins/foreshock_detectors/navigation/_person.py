@@ -24,8 +24,8 @@ class Person:
 
     Where he is, is known with his first sample, and so is how he moves if the tracker reports it. If it does not, his
     velocity takes two time constants of its filter (0.4 s by default), and what rests on it is not judged before. That
-    is longer than trust.grace_s (0.3 s by default): somebody new brings the minimal risk condition for a tenth of a
-    second. To avoid it, report HumanPose.velocity.
+    is longer than trust.grace_s (0.3 s by default): somebody new brings the minimal risk condition, which an operator
+    has to reset. To avoid it, report HumanPose.velocity, or allow a longer grace time.
 
     Attributes:
         id: of the track.
