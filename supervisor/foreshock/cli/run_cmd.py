@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from foreshock.cli.output import OK, console, emit, notes
+from foreshock.errors import BadInputError
 from foreshock.live import LiveSupervisor, load_run
 from foreshock.records import Decision, ProtectionLevel
 
@@ -17,14 +18,17 @@ __all__ = ["run"]
 @click.command()
 @click.argument("config", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 @click.option("--seconds", type=click.FloatRange(0.0, min_open=True), help="End after this time; never by default.")
+@click.option("--journal", type=click.Path(path_type=Path, dir_okay=False), help="Record everything in this MCAP file.")
 @click.option("--json", "as_json", is_flag=True, help="Print the status at the end as JSON.")
-def run(config: Path, seconds: float | None, as_json: bool) -> int:
+def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool) -> int:
     """Supervise a robot live over Zenoh, as CONFIG says, until SIGINT or SIGTERM.
 
     It takes the robot's streams, and publishes decisions, interventions, health and the motion lease; watch it with
     foreshock top.
     """
-    live = LiveSupervisor(load_run(config), config.parent)
+    if journal is not None and journal.exists():
+        raise BadInputError("--journal", f"{journal} exists; a journal is never overwritten", "; choose another name")
+    live = LiveSupervisor(load_run(config), config.parent, journal=journal)
     stop = threading.Event()
     last = ProtectionLevel.NORMAL
     timer = threading.Timer(seconds, stop.set) if seconds is not None else None

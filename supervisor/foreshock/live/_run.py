@@ -24,7 +24,7 @@ from foreshock.live._robot import RobotLink
 from foreshock.live._services import Services
 from foreshock.live._status import Status, TickTimes, stream_status
 from foreshock.live._stream import Stream
-from foreshock.recording import Head
+from foreshock.recording import Head, McapJournal
 from foreshock.records import Decision, ProtectionLevel, Sample
 from foreshock.registry import Registry
 from foreshock.supervisor import Supervisor
@@ -42,12 +42,19 @@ class LiveSupervisor:
         run: what to run.
         base: folder that relative paths of the configuration start from.
         registry: of plugins.
+        journal: one file to record everything in, instead of the folder that the configuration names.
 
     Raises:
         BadInputError: the configuration does not fit, or the link cannot be opened.
     """
 
-    def __init__(self, run: RunConfig, base: Path | None = None, registry: Registry | None = None) -> None:
+    def __init__(
+        self,
+        run: RunConfig,
+        base: Path | None = None,
+        registry: Registry | None = None,
+        journal: Path | None = None,
+    ) -> None:
         base = base or Path()
         self._run, self.epoch = run, wall_ns()
         self.supervisor = Supervisor(run.config, base, registry, epoch=self.epoch)
@@ -74,7 +81,8 @@ class LiveSupervisor:
             self._session.close()
             raise
         self._base = base
-        self._journal: SegmentedJournal | None = None
+        self._journal_file = journal
+        self._journal: SegmentedJournal | McapJournal | None = None
         self._needed = self.supervisor.required_channels()
         self._missing = sorted(self._needed) or [s.channel for s in self._streams]
         self._times = TickTimes()
@@ -220,12 +228,13 @@ class LiveSupervisor:
         while self._history and now_ns - self._history[0][0] > self._run.live.history_s * NS_PER_S:
             self._history.popleft()
 
-    def _open_journal(self) -> SegmentedJournal | None:
-        settings = self._run.journal
+    def _open_journal(self) -> SegmentedJournal | McapJournal | None:
+        settings, base = self._run.journal, self._base
+        head = Head(self._run.tables, str(base.resolve()), 0, self._began_ns)
+        if self._journal_file is not None:
+            return McapJournal(self._journal_file, head)
         if not settings.folder:
             return None
-        base = self._base
-        head = Head(self._run.tables, str(base.resolve()), 0, self._began_ns)
         stem = f"{self._run.config.supervisor.robot}-{self.epoch}"
         return SegmentedJournal(base / settings.folder, stem, head, settings, self.epoch / NS_PER_S)
 
