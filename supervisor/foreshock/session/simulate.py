@@ -130,6 +130,7 @@ def simulate(
         digest.digest if detail and judge is not None else "",
         log.max_level,
         warnings_of(judge, scenario.mode) if judge is not None else (),
+        log.peak_p,
     )
 
 
@@ -167,12 +168,15 @@ class _Log:
         self.rows: list[TimelineRow] = []
         self.series: dict[str, list[float]] = {}
         self.max_level = 0
+        self.peak_p: float | None = None
+        self._over = False
 
     def tick(self, now_ns: int, decision: Decision | None, events: Sequence[TwinEvent], twin: Twin) -> None:
         """Take one tick."""
         t = seconds(now_ns)
         news = tuple(f"{e.id} ({e.value:.0f} {e.unit})" if e.mode else e.id for e in events[self._events :])
         self._events = len(events)
+        self._over = self._over or any(e.mode == self._mode for e in events)
         if decision is not None:
             self._judged(t, decision, news)
         elif news and self._detail:
@@ -185,6 +189,8 @@ class _Log:
         mode = self._mode
         self.interventions += d.changes
         self.health += d.health
+        if not self._over:
+            self.peak_p = max(self.peak_p or 0.0, d.risk.by_mode[mode])
         level = d.level if d.level is ProtectionLevel.MINIMAL_RISK else d.levels[mode]
         self.max_level = max(self.max_level, level)
         for gate in (ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE):
