@@ -8,12 +8,13 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
-from foreshock.campaign.identity import changes
+from foreshock.campaign.identity import changes, digest
 from foreshock.campaign.ledger import Ledger, Row, locked, row_of
-from foreshock.campaign.plan import Case, Plan, plan_of
+from foreshock.campaign.plan import Case, Plan, plan_of, under
 from foreshock.campaign.spec import CampaignSpec
 from foreshock.clock import monotonic_ns, seconds
 from foreshock.errors import BadInputError, ConfigError
@@ -39,6 +40,11 @@ class Campaign(msgspec.Struct, frozen=True):
         """What was run, in the plan's order."""
         with Ledger(self.folder) as ledger:
             return ledger.rows(self.plan.cases)
+
+    def recorded(self) -> list[Row]:
+        """What was run last of each run, whatever has changed since then."""
+        with Ledger(self.folder) as ledger:
+            return ledger.recorded(ledger.meta("keys", list[str]))
 
 
 class Estimate(msgspec.Struct, frozen=True):
@@ -78,7 +84,7 @@ def begin(spec: CampaignSpec, origin: Path, folder: Path, registry: Registry) ->
     """
     plan = plan_of(spec, origin, registry)
     with locked(folder), Ledger(folder, new=True) as ledger:
-        ledger.put_meta(spec=spec, origin=str(origin), identity=plan.identity)
+        ledger.put_meta(spec=spec, origin=str(origin), **_facts(plan))
     return Campaign(folder, plan)
 
 
@@ -96,8 +102,13 @@ def reopen(folder: Path, registry: Registry, *, accept: bool = False) -> tuple[C
         plan = plan_of(spec, Path(ledger.meta("origin", str)), registry)
         found = changes(before, plan.identity)
         if found and accept:
-            ledger.put_meta(identity=plan.identity)
+            ledger.put_meta(**_facts(plan))
     return Campaign(folder, plan), found
+
+
+def _facts(plan: Plan) -> dict[str, Any]:
+    """What is kept of a plan: what it depends on, and the keys of its runs."""
+    return {"identity": plan.identity, "keys": [c.key for c in plan.cases]}
 
 
 def refuse_changes(folder: Path, found: Sequence[str]) -> None:
@@ -130,6 +141,7 @@ class _Feed:
         self._cases = {c.key: c for c in campaign.plan.cases}
         self._status = {k: s for k, s in ledger.statuses().items() if k in self._cases}
         self._scripted: dict[str, tuple[Intervention, ...]] = {}
+        self._configs: dict[tuple[str, str], str] = {}
         self._waiting: dict[str, list[Case]] = {}
         self._begin_ns, self._new = monotonic_ns(), 0
         hours = campaign.plan.spec.budget.hours
@@ -163,7 +175,7 @@ class _Feed:
                 self._ready.append(case)
 
     def _estimate(self, left: Sequence[Case]) -> Estimate:
-        """By the pace of the first runs, and the time that was spent around them: each arm sets up anew."""
+        """By the pace of the first runs, and the time spent around them: each further configuration sets up anew."""
         duration_s = {id_: s.duration_s for id_, s in self._plan.scenarios.items()}
         pace = {self._cases[k].scenario: w for k, w in self._pilots.items() if not math.isnan(w)}
         if not left or not pace:
@@ -171,9 +183,19 @@ class _Feed:
         mean = sum(pace.values()) / len(pace)
         ran_s = sum(duration_s[id_] * w for id_, w in pace.items())
         set_up_s = max(seconds(monotonic_ns() - self._begin_ns) - ran_s / self._workers, 0.0) / len(pace)
-        arms = len({(c.scenario, c.arm) for c in left if self._judged(c)})
         wall_s = sum(duration_s[c.scenario] * pace.get(c.scenario, mean) for c in left) / self._workers
-        return Estimate(len(left), self._plan.simulated_s(left), wall_s + arms * set_up_s)
+        built = {self._set_up(self._cases[k]) for k in self._pilots}
+        further = {self._set_up(c) for c in left if self._judged(c)} - built
+        return Estimate(len(left), self._plan.simulated_s(left), wall_s + len(further) * set_up_s)
+
+    def _set_up(self, case: Case) -> tuple[str, str]:
+        """What a worker builds for a run and keeps: runs of the same share it."""
+        key = case.scenario, case.arm
+        if key not in self._configs:
+            self._configs[key] = digest(
+                under(self._plan.scenarios[case.scenario], self._plan.spec.arm(case.arm)).config
+            )
+        return case.scenario, self._configs[key]
 
     def next(self) -> tuple[str, Job] | None:
         """The next run."""

@@ -43,6 +43,7 @@ class Row(msgspec.Struct, frozen=True):
         replicate: number of the seed at this point.
         seed: of the run.
         parameters: values of the factors.
+        fault: id of what was injected; empty for nothing.
         status: ``ok``, or what failed: ``error``, ``discard``, ``nan``, ``hang``, ``crash``, ``bad-input``, or
             ``source`` where the run whose interventions it takes gave no result.
         detail: what was said of a failure.
@@ -70,6 +71,7 @@ class Row(msgspec.Struct, frozen=True):
     replicate: int
     seed: int
     parameters: dict[str, float]
+    fault: str = ""
     status: str = "ok"
     detail: str = ""
     log: str = ""
@@ -95,7 +97,8 @@ class Row(msgspec.Struct, frozen=True):
 
 def row_of(case: Case, result: Run | Failure, wall_s: float, scripted: tuple[Intervention, ...]) -> Row:
     """The row of a run that has ended."""
-    at = (case.key, case.scenario, case.mode, case.arm, case.point, case.replicate, case.seed, case.parameters)
+    where = (case.key, case.scenario, case.mode, case.arm, case.point, case.replicate, case.seed)
+    at = (*where, case.parameters, case.fault)
     if isinstance(result, Failure):
         return Row(*at, status=result.kind, detail=result.detail, log=result.log)
     changes = result.interventions or scripted
@@ -190,8 +193,12 @@ class Ledger:
 
     def rows(self, cases: Iterable[Case]) -> list[Row]:
         """What is there of these runs, in their order."""
+        return self.recorded(c.key for c in cases)
+
+    def recorded(self, keys: Iterable[str]) -> list[Row]:
+        """What is there under these keys, in their order."""
         found: dict[str, bytes] = dict(self._db.execute("select key, row from runs"))
-        return [msgspec.json.decode(found[c.key], type=Row) for c in cases if c.key in found]
+        return [msgspec.json.decode(found[key], type=Row) for key in keys if key in found]
 
     def statuses(self) -> dict[str, str]:
         """Status by key."""

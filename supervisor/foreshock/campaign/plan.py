@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -12,7 +13,7 @@ import msgspec
 from foreshock._strict import convert
 from foreshock.campaign.identity import digest, twin_files, versions
 from foreshock.campaign.sampling import points_of
-from foreshock.campaign.spec import ArmEntry, CampaignSpec, ScenarioEntry
+from foreshock.campaign.spec import ArmEntry, CampaignSpec, FaultEntry, ScenarioEntry
 from foreshock.errors import ConfigError, nearest
 from foreshock.records import Intervention
 from foreshock.registry import Registry
@@ -21,7 +22,7 @@ from foreshock.session.run import Arm
 from foreshock.session.scenario import Scenario, find_scenario, load_scenario, scenario_ids
 from foreshock.session.scripted import held, moved
 
-__all__ = ["Case", "Plan", "plan_of"]
+__all__ = ["Case", "Plan", "plan_of", "under"]
 
 SUPERVISOR: Mapping[str, Arm] = {"none": "off", "shadow": "shadow", "on": "on", "random": "off", "always": "off"}
 
@@ -38,6 +39,7 @@ class Case(msgspec.Struct, frozen=True):
         seed: of the run.
         arm: id.
         parameters: values of the factors.
+        fault: id of what is injected; empty for nothing.
         source: key of the run whose interventions it takes; empty for none.
     """
 
@@ -49,6 +51,7 @@ class Case(msgspec.Struct, frozen=True):
     seed: int
     arm: str
     parameters: dict[str, float]
+    fault: str = ""
     source: str = ""
 
 
@@ -68,8 +71,9 @@ class Plan(msgspec.Struct, frozen=True):
     cases: tuple[Case, ...]
 
     def scenario(self, case: Case) -> Scenario:
-        """The scenario of a run, under its arm and with its values."""
-        return under(self.scenarios[case.scenario], self.spec.arm(case.arm)).with_(case.parameters)
+        """The scenario of a run, under its arm, with its values and faults."""
+        scenario = under(self.scenarios[case.scenario], self.spec.arm(case.arm)).with_(case.parameters)
+        return _with_faults(scenario, next((f for f in self.spec.faults if f.id == case.fault), None))
 
     def job(self, case: Case, changes: tuple[Intervention, ...] = ()) -> Job:
         """The run, given the interventions of the run that it takes them from."""
@@ -90,7 +94,25 @@ class Plan(msgspec.Struct, frozen=True):
 def under(scenario: Scenario, arm: ArmEntry) -> Scenario:
     """A scenario with the configuration of an arm."""
     changed = scenario.with_(policy=arm.policy)
-    return msgspec.structs.replace(changed, config=merged(changed.config, arm.config))
+    return msgspec.structs.replace(changed, config=merged(changed.config, _filled(arm.config, scenario.mode)))
+
+
+def _filled(value: Any, mode: str) -> Any:
+    if isinstance(value, Mapping):
+        return {k: _filled(v, mode) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_filled(v, mode) for v in value]
+    return mode if value == "{mode}" else value
+
+
+def _with_faults(scenario: Scenario, entry: FaultEntry | None) -> Scenario:
+    if entry is None:
+        return scenario
+    return msgspec.structs.replace(scenario, faults=(*scenario.faults, *entry.faults))
+
+
+def _matches(id_: str, patterns: Iterable[str]) -> bool:
+    return any(fnmatchcase(id_, pattern) for pattern in patterns)
 
 
 def merged(base: Mapping[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:
@@ -150,11 +172,14 @@ def _scenarios(spec: CampaignSpec, folder: Path, registry: Registry) -> list[tup
             if scenario.id in found:
                 raise ConfigError("scenarios.use", f"{entry.use!r} gives {scenario.id!r} a second time")
             found[scenario.id] = (changed, entry.replicates or spec.replicates)
-    for factor in spec.factors:
-        for pattern in factor.scenarios:
+    entries = [(f"factors.{f.parameter}", f.scenarios) for f in spec.factors]
+    entries += [(f"faults.{f.id}", f.scenarios) for f in spec.faults]
+    entries += [(f"arms.{a.id}", a.scenarios) for a in spec.arms]
+    for place, patterns in entries:
+        for pattern in patterns:
             if not any(fnmatchcase(id_, pattern) for id_ in found):
-                place = f"factors.{factor.parameter}.scenarios"
-                raise ConfigError(place, f"{pattern!r} is none of the campaign's scenarios", nearest(pattern, found))
+                problem = f"{pattern!r} is none of the campaign's scenarios"
+                raise ConfigError(f"{place}.scenarios", problem, nearest(pattern, found))
     return list(found.values())
 
 
@@ -176,7 +201,7 @@ def _check_arms(spec: CampaignSpec, scenarios: Mapping[str, Scenario], registry:
     for scenario in scenarios.values():
         plugins.add(scenario.twin["kind"])
         for arm in spec.arms:
-            if not arm.judged:
+            if not arm.judged or not _matches(scenario.id, arm.scenarios):
                 continue
             place = f"{scenario.id}, arm {arm.id}"
             config = under(scenario, arm).supervisor()
@@ -189,24 +214,30 @@ def _check_arms(spec: CampaignSpec, scenarios: Mapping[str, Scenario], registry:
 
 
 def _cases(spec: CampaignSpec, scenario: Scenario, replicates: int, identity: dict[str, Any]) -> list[Case]:
-    factors = [f for f in spec.factors if any(fnmatchcase(scenario.id, pattern) for pattern in f.scenarios)]
+    factors = [f for f in spec.factors if _matches(scenario.id, f.scenarios)]
+    faults = [None, *(f for f in spec.faults if _matches(scenario.id, f.scenarios))]
+    arms = sorted((a for a in spec.arms if _matches(scenario.id, a.scenarios)), key=lambda a: a.scripted)
     cases = []
     for p, values in enumerate(points_of(spec, factors, scenario.id)):
-        for r in range(replicates):
+        for r, fault in itertools.product(range(replicates), faults):
             # a grid compares its points on the same seeds; sampled points are independent, and so are their seeds
             seed = spec.seed + r + (0 if spec.sampler == "grid" else p * replicates)
             keys: dict[str, str] = {}
-            for arm in sorted(spec.arms, key=lambda a: a.scripted):
-                source = keys[spec.source(arm).id] if arm.scripted else ""
+            for arm in arms:
+                source = keys.get(spec.source(arm).id, "") if arm.scripted else ""
+                if arm.scripted and not source:
+                    continue
                 parts = {
                     **identity,
-                    "scenario": _content(under(scenario, arm).with_(values)),
+                    "scenario": _content(_with_faults(under(scenario, arm).with_(values), fault)),
                     "arm": arm.kind,
                     "seed": seed,
                     "source": source,
                 }
                 if not arm.judged:
                     parts["scenario"]["config"] = {"supervisor": scenario.config.get("supervisor")}
-                keys[arm.id] = digest([arm.id, p, r, parts])
-                cases.append(Case(keys[arm.id], scenario.id, scenario.mode, p, r, seed, arm.id, values, source))
+                fault_id = fault.id if fault is not None else ""
+                keys[arm.id] = digest([arm.id, p, r, fault_id, parts])
+                at = (keys[arm.id], scenario.id, scenario.mode, p, r, seed, arm.id, values, fault_id, source)
+                cases.append(Case(*at))
     return cases

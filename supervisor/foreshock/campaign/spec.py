@@ -12,12 +12,14 @@ import msgspec
 
 from foreshock._strict import convert, read_toml, within
 from foreshock.errors import ConfigError, nearest
+from foreshock.session.faults import Fault
 
 __all__ = [
     "ArmEntry",
     "Budget",
     "CampaignSpec",
     "Factor",
+    "FaultEntry",
     "Metric",
     "ScenarioEntry",
     "campaign_schema",
@@ -104,7 +106,9 @@ class ArmEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             run of the same seed without a supervisor: all moved to a ``random`` time, or ``always`` held.
         title: for people.
         policy: replaces the scenario's policies.
-        config: tables that are merged into the scenario's configuration, key by key; lists replace lists.
+        config: tables that are merged into the scenario's configuration, key by key; lists replace lists. The text
+            ``{mode}`` stands for the code of the scenario's mode.
+        scenarios: ids or patterns of the scenarios that it runs in; by default all.
         of: for random and always: id of the arm whose interventions they are; the first that is on by default.
         acts_by: what counts as an intervention: reaching the protective ``level``, or any ``action`` of the scenario's
             mode, for policies that do not follow levels.
@@ -115,6 +119,7 @@ class ArmEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     title: str = ""
     policy: str | None = None
     config: dict[str, Any] = {}
+    scenarios: tuple[str, ...] = ("*",)
     of: str = ""
     acts_by: Literal["level", "action"] = "level"
 
@@ -136,6 +141,26 @@ class ArmEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ConfigError(place, f"policy and config have no meaning for an arm of kind {self.kind!r}")
         if self.of and not self.scripted:
             raise ConfigError(f"{place}.of", f"has no meaning for an arm of kind {self.kind!r}")
+
+
+class FaultEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Faults that are injected together; every point runs without any and with each entry.
+
+    Attributes:
+        id: kebab-case.
+        faults: as in a scenario, whose own stay.
+        scenarios: ids or patterns of the scenarios that have them; by default all.
+    """
+
+    id: str
+    faults: tuple[Fault, ...]
+    scenarios: tuple[str, ...] = ("*",)
+
+    def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.id):
+            raise ConfigError("faults.id", f"{self.id!r} is not kebab-case")
+        if not self.faults:
+            raise ConfigError(f"faults.{self.id}.faults", "is empty")
 
 
 class Budget(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -165,6 +190,7 @@ class CampaignSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         arms: what is compared.
         title: one line for people.
         factors: what is varied; without any, each scenario has one point.
+        faults: what is injected, beside runs without.
         sampler: how points are chosen.
         points: how many of them for each scenario; a grid has as many as it has. Sobol wants a power of two.
         replicates: seeds per point.
@@ -180,6 +206,7 @@ class CampaignSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     arms: tuple[ArmEntry, ...]
     title: str = ""
     factors: tuple[Factor, ...] = ()
+    faults: tuple[FaultEntry, ...] = ()
     sampler: Sampler = "grid"
     points: int | None = None
     replicates: int = 1
@@ -217,9 +244,10 @@ class CampaignSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def _check_arms(self) -> None:
         ids = [arm.id for arm in self.arms]
-        for id_ in ids:
-            if ids.count(id_) > 1:
-                raise ConfigError("arms", f"id {id_!r} is given twice")
+        for name, given in (("arms", ids), ("faults", [f.id for f in self.faults])):
+            for id_ in given:
+                if given.count(id_) > 1:
+                    raise ConfigError(name, f"id {id_!r} is given twice")
         if self.reference and self.reference not in ids:
             raise ConfigError("reference", f"there is no arm {self.reference!r}", nearest(self.reference, ids))
         for arm in self.arms:

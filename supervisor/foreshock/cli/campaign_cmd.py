@@ -13,11 +13,22 @@ import msgspec
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
+from foreshock.campaign.again import Again, case_of
+from foreshock.campaign.again import rerun as rerun_case
+from foreshock.campaign.compare import compare as compare_campaigns
 from foreshock.campaign.engine import Campaign, Estimate, Progress, begin, execute, refuse_changes, reopen
 from foreshock.campaign.ledger import Row
+from foreshock.campaign.plan import Case
+from foreshock.campaign.report import write_results
+from foreshock.campaign.results import ArmResult
 from foreshock.campaign.spec import campaign_schema, load_campaign, shipped
-from foreshock.cli.output import FAILED, OK, console, emit, notes, table
+from foreshock.cli._campaign_results import print_changes, print_results, results_json
+from foreshock.cli.output import FAILED, NEGATIVE, OK, console, emit, notes, table
+from foreshock.cli.simulate_cmd import summary, timeline
+from foreshock.errors import BadInputError, MissingExtraError
 from foreshock.registry import Registry
+from foreshock.session.isolated import Failure
+from foreshock.session.run import Run
 
 __all__ = ["campaign"]
 
@@ -93,16 +104,123 @@ def status(folder: Path, as_json: bool) -> int:
     return OK
 
 
+@campaign.command()
+@folder_argument
+@json_option
+def report(folder: Path, as_json: bool) -> int:
+    """Write runs.parquet, results.parquet and report.html into DIR, and print the results.
+
+    Also of a campaign that is not complete.
+    """
+    found, _ = reopen(folder, Registry())
+    results, paths = write_results(found)
+    if as_json:
+        emit({"results": results_json(results), "files": [str(p) for p in paths]})
+        return OK
+    print_results(found.plan.spec, results)
+    for path in paths:
+        console.print(str(path), markup=False)
+    return OK
+
+
+@campaign.command()
+@click.argument("first", type=click.Path(path_type=Path, file_okay=False), metavar="A")
+@click.argument("second", type=click.Path(path_type=Path, file_okay=False), metavar="B")
+@json_option
+def compare(first: Path, second: Path, as_json: bool) -> int:
+    """Hold campaign B against campaign A, run by run where they share runs.
+
+    Exit code 1 if a result of B is significantly worse: more accidents or false interventions, less lead time, more
+    runs without a result.
+    """
+    registry = Registry()
+    sides = [reopen(folder, registry)[0] for folder in (first, second)]
+    changes = compare_campaigns(*((c.plan, c.recorded()) for c in sides))
+    if as_json:
+        emit([{**msgspec.to_builtins(c), "worse": c.worse} for c in changes])
+    elif changes:
+        print_changes(changes)
+    else:
+        console.print("they have no arm in common")
+    return NEGATIVE if any(c.worse for c in changes) else OK
+
+
+@campaign.command()
+@folder_argument
+@click.argument("key")
+@click.option("--report", "page", type=click.Path(path_type=Path, dir_okay=False), help="Write an HTML report here.")
+@click.option("--journal", type=click.Path(path_type=Path, dir_okay=False), help="Record the run in this MCAP file.")
+@json_option
+def rerun(folder: Path, key: str, page: Path | None, journal: Path | None, as_json: bool) -> int:
+    """Run one run of DIR again, in full detail: KEY is the beginning of its key, as in the report.
+
+    Exit code 1 if it is not what the ledger says.
+    """
+    found, changed = reopen(folder, Registry())
+    case = case_of(found, key, changed)
+    again = rerun_case(found, case, journal)
+    if as_json:
+        result = again.result
+        shown = msgspec.structs.replace(result, series={}) if isinstance(result, Run) else _failure(result)
+        emit({"case": case, "result": shown, "differs": again.differs, "known": again.known, "changed": changed})
+    else:
+        _print_again(again, changed)
+    if page is not None and isinstance(again.result, Run):
+        _page(page, again.result, case)
+    return NEGATIVE if again.differs else OK
+
+
+def _failure(failure: Failure) -> dict[str, str]:
+    return {"kind": failure.kind, "detail": failure.detail, "log": failure.log}
+
+
+def _page(path: Path, run: Run, case: Case) -> None:
+    try:
+        from foreshock.report import write_report
+    except ImportError as e:
+        raise BadInputError("--report", f"needs {e.name}", "; run: pip install 'foreshock[report]'") from e
+    write_report(path, f"{case.scenario}, arm {case.arm}, seed {case.seed}", [(case.arm, run)])
+    console.print(f"report: {path}", markup=False)
+
+
+def _print_again(again: Again, changed: list[str]) -> None:
+    case, result = again.case, again.result
+    if isinstance(result, Run):
+        timeline(result, f"{case.key}: {case.scenario}, arm {case.arm}, seed {case.seed}")
+        console.print(summary(result), soft_wrap=True)
+    else:
+        console.print(f"{result.kind}: {result.detail}", markup=False)
+    for line in changed:
+        console.print(f"changed since it was begun: {line}", markup=False)
+    if not again.known:
+        console.print("the ledger has no result of it yet")
+    elif not again.differs:
+        console.print("the same as in the ledger")
+    for name, (before, now) in again.differs.items():
+        console.print(f"differs: {name} was {before}, is {now}", markup=False, style="red")
+
+
 def _go(found: Campaign, workers: int, as_json: bool, *, retry: bool = False) -> int:
     total = len(found.plan.cases)
     with _bar(total, as_json) as (estimated, told):
         complete = execute(found, workers, estimated=estimated, told=told, retry=retry)
     rows = found.rows()
     state = _state(found, rows, [])
+    results: list[ArmResult] = []
+    files: list[str] = []
+    try:
+        results, paths = write_results(found)
+        files = [str(p) for p in paths]
+    except MissingExtraError as e:
+        notes.print(f"no report: {e}", markup=False)
     if as_json:
-        emit(state)
+        emit({**state, "complete": complete, "results": results_json(results), "files": files})
     else:
+        if results:
+            print_results(found.plan.spec, results)
         _print_state(state, rows)
+        for path in files:
+            console.print(path, markup=False)
     if not complete:
         notes.print(f"the budget of wall time is used up; go on with: foreshock campaign resume {found.folder}")
     return FAILED if any(not r.ok for r in rows) else OK
