@@ -23,6 +23,8 @@ from foreshock.campaign.sampling import points_of, quantile
 from foreshock.campaign.spec import CampaignSpec, Factor
 from foreshock.errors import ConfigError
 from foreshock.registry import Registry
+from foreshock.session.scenario import scenario_ids
+from foreshock_detectors import baselines
 
 LEAST: dict[str, Any] = {"id": "c", "scenarios": [{"use": "a1-fall-onto-human"}], "arms": [{"id": "on", "kind": "on"}]}
 
@@ -80,6 +82,20 @@ def test_shipped_campaigns_fit_the_schema(id_: str) -> None:
     assert spec.title
     jsonschema.Draft202012Validator(campaign_schema()).validate(read_toml(shipped()[id_]))
     json.dumps(campaign_schema())
+
+
+@pytest.mark.parametrize("id_", sorted(shipped()))
+def test_shipped_campaigns_fit_the_plugins(id_: str) -> None:
+    spec, folder = load_campaign(id_)
+    # by name, so that it does not matter which version of the entry points is installed
+    registry = Registry(dict.fromkeys(("reactive-stop", "capture-point", "speed-separation"), baselines))
+    plan = plan_of(spec, folder, registry)
+    assert {c.arm for c in plan.cases} == {a.id for a in spec.arms}
+    assert {c.fault for c in plan.cases} == {"", *(f.id for f in spec.faults)}
+    if id_ == "twelve-modes":
+        shipped_scenarios = {k for k in scenario_ids(Registry()) if k.startswith("a")}
+        assert set(plan.scenarios) == shipped_scenarios
+        assert len({c.mode for c in plan.cases}) == 12
 
 
 def test_arms_share_seeds_and_scripted_arms_follow_theirs() -> None:

@@ -125,7 +125,8 @@ def refuse_changes(folder: Path, found: Sequence[str]) -> None:
 class _Feed:
     """Gives the runs that are left, each after the run whose interventions it takes, and writes results down.
 
-    One run of each scenario comes first: it finds bad input before it costs much, and says how long the rest takes.
+    First comes of each scenario a run with a supervisor and one without: they find bad input before it costs much, and
+    say how long the rest takes.
     """
 
     def __init__(
@@ -153,11 +154,11 @@ class _Feed:
             self._go_on()
 
     def _first(self) -> list[Case]:
-        """One run of each scenario that has any left, with a supervisor if there is one: it costs most."""
-        first: dict[str, Case] = {}
+        """Of each scenario that has any left a run with a supervisor, and one without, which costs less."""
+        first: dict[tuple[str, bool], Case] = {}
         for case in self.left():
-            if not case.source and (case.scenario not in first or not self._judged(first[case.scenario])):
-                first[case.scenario] = case
+            if not case.source:
+                first.setdefault((case.scenario, self._judged(case)), case)
         return list(first.values())
 
     def _judged(self, case: Case) -> bool:
@@ -177,16 +178,20 @@ class _Feed:
     def _estimate(self, left: Sequence[Case]) -> Estimate:
         """By the pace of the first runs, and the time spent around them: each further configuration sets up anew."""
         duration_s = {id_: s.duration_s for id_, s in self._plan.scenarios.items()}
-        pace = {self._cases[k].scenario: w for k, w in self._pilots.items() if not math.isnan(w)}
+        pilots = {k: w for k, w in self._pilots.items() if not math.isnan(w)}
+        pace = {(c.scenario, self._judged(c)): pilots[c.key] for c in map(self._cases.__getitem__, pilots)}
         if not left or not pace:
             return Estimate(len(left), self._plan.simulated_s(left), math.nan if left else 0.0)
         mean = sum(pace.values()) / len(pace)
-        ran_s = sum(duration_s[id_] * w for id_, w in pace.items())
+        ran_s = sum(duration_s[id_] * w for (id_, _), w in pace.items())
         set_up_s = max(seconds(monotonic_ns() - self._begin_ns) - ran_s / self._workers, 0.0) / len(pace)
-        wall_s = sum(duration_s[c.scenario] * pace.get(c.scenario, mean) for c in left) / self._workers
+        wall_s = 0.0
+        for case in left:
+            of_judged = pace.get((case.scenario, True), mean)
+            wall_s += duration_s[case.scenario] * pace.get((case.scenario, self._judged(case)), of_judged)
         built = {self._set_up(self._cases[k]) for k in self._pilots}
         further = {self._set_up(c) for c in left if self._judged(c)} - built
-        return Estimate(len(left), self._plan.simulated_s(left), wall_s + len(further) * set_up_s)
+        return Estimate(len(left), self._plan.simulated_s(left), wall_s / self._workers + len(further) * set_up_s)
 
     def _set_up(self, case: Case) -> tuple[str, str]:
         """What a worker builds for a run and keeps: runs of the same share it."""
