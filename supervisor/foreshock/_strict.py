@@ -81,6 +81,8 @@ def _refuse_unknown(data: object, to: Any, place: str) -> None:
         options = [t for t in typing.get_args(to) if t is not type(None)]
         if len(options) == 1:
             _refuse_unknown(data, options[0], place)
+        elif isinstance(data, Mapping) and all(getattr(t, "__struct_config__", None) for t in options):
+            _refuse_unknown(data, _tagged(data, options, place), place)
     elif origin is typing.Literal:
         known = [a for a in typing.get_args(to) if isinstance(a, str)]
         if isinstance(data, str) and data not in known:
@@ -93,9 +95,25 @@ def _refuse_unknown(data: object, to: Any, place: str) -> None:
             _refuse_unknown(item, typing.get_args(to)[1], f"{place}.{key}")
     elif isinstance(data, Mapping) and isinstance(to, type) and issubclass(to, msgspec.Struct):
         hints = typing.get_type_hints(to)
+        tag = to.__struct_config__.tag_field
         names = dict(zip(to.__struct_encode_fields__, to.__struct_fields__, strict=True))
         joint = "." if ":" in place else ": "
         for key, item in data.items():
+            if key == tag:
+                continue
             if key not in names:
                 raise ConfigError(f"{place}{joint}{key}", "unknown key", nearest(key, names))
             _refuse_unknown(item, hints[names[key]], f"{place}{joint}{key}")
+
+
+def _tagged(data: Mapping[Any, Any], options: list[Any], place: str) -> Any:
+    """Which of several Structs a table is, by the key that tells them apart."""
+    field = options[0].__struct_config__.tag_field
+    known = {t.__struct_config__.tag: t for t in options}
+    where = f"{place}{'.' if ':' in place else ': '}{field}"
+    if field not in data:
+        raise ConfigError(where, f"missing; expected one of {', '.join(map(repr, known))}")
+    tag = data[field]
+    if not isinstance(tag, str) or tag not in known:
+        raise ConfigError(where, f"{tag!r} is not one of {', '.join(map(repr, known))}", nearest(str(tag), known))
+    return known[tag]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
@@ -101,9 +101,12 @@ class TwinSpec(msgspec.Struct, frozen=True):
         build: makes one from the scenario's ``[twin]`` table, the robot's name and a private scratch directory.
         config: frozen Struct of the ``[twin]`` table without its ``kind``.
         summary: one line for people.
+        files: the files that a twin of this configuration consists of, by role: its FMU, its binding. A campaign knows
+            by their content whether it is still the same twin. None if the kind has none, or cannot say.
     """
 
     id: str
     build: TwinBuilder
     config: type[msgspec.Struct]
     summary: str = ""
+    files: Callable[[Any], Mapping[str, Path]] | None = None

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 import msgspec
 
+from foreshock.campaign import campaign_schema
 from foreshock.cli import cli
 from foreshock.config import config_schema
 from foreshock.hookspecs import GROUP
@@ -45,7 +46,12 @@ def schema() -> str:
     return msgspec.json.format(msgspec.json.encode(full, order="sorted"), indent=2).decode() + "\n"
 
 
-PAGES = {"cli.md": cli_page, "config.schema.json": schema}
+def campaign_page() -> str:
+    """JSON schema of a campaign file."""
+    return msgspec.json.format(msgspec.json.encode(campaign_schema(), order="sorted"), indent=2).decode() + "\n"
+
+
+PAGES = {"campaign.schema.json": campaign_page, "cli.md": cli_page, "config.schema.json": schema}
 
 
 def stale() -> list[str]:

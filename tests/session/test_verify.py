@@ -8,11 +8,11 @@ import pytest
 
 from foreshock.records import Intervention
 from foreshock.registry import Registry
-from foreshock.session.isolated import Failure, Job
 from foreshock.session.rates import per_hour, wilson
 from foreshock.session.run import Arm, Run
 from foreshock.session.scenario import find_scenario, scenario_ids
-from foreshock.session.verify import Cascade, ModeResult, _cascade, _held, _judged, _moved, plan_of, verify
+from foreshock.session.scripted import held, moved
+from foreshock.session.verify import Cascade, ModeResult, _cascade, _judged, plan_of, verify
 from foreshock.twin import TwinEvent
 
 SECOND = 1_000_000_000
@@ -50,14 +50,14 @@ def test_the_same_actions_come_at_another_time_of_the_same_length() -> None:
     run = supervised(Intervention(2 * SECOND, "balance-lock", 1.0), Intervention(5 * SECOND, "balance-lock", 0.0))
     starts = []
     for seed in range(200):
-        on, off = _moved(run, scenario, seed)
+        on, off = moved(run.interventions, scenario.duration_s, seed)
         assert off.stamp_ns - on.stamp_ns == 3 * SECOND
         starts.append(on.stamp_ns / 1e9)
     # uniform over the scenario: mean within four standard errors of the middle
     assert sum(starts) / 200 == pytest.approx(
         scenario.duration_s / 2, abs=4 * scenario.duration_s / math.sqrt(12 * 200)
     )
-    assert _moved(Failure(Job(scenario, "on", 0), "hang", ""), scenario, 0) == ()
+    assert moved((), scenario.duration_s, 0) == ()
 
 
 def test_always_on_is_every_action_at_its_strongest_from_the_start() -> None:
@@ -66,7 +66,7 @@ def test_always_on_is_every_action_at_its_strongest_from_the_start() -> None:
         Intervention(2 * SECOND, "speed-scale", 0.7),
         Intervention(3 * SECOND, "speed-scale", 0.0),
     )
-    assert [(i.stamp_ns, i.action, i.strength) for i in _held(run)] == [(0, "speed-scale", 0.7)]
+    assert [(i.stamp_ns, i.action, i.strength) for i in held(run.interventions)] == [(0, "speed-scale", 0.7)]
 
 
 def test_an_accident_of_another_mode_is_harm_that_was_caused() -> None:

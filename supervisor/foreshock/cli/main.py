@@ -12,6 +12,7 @@ import click
 from rich.markup import escape
 
 from foreshock.cli.calibrate_cmd import calibrate
+from foreshock.cli.campaign_cmd import campaign
 from foreshock.cli.config_cmd import config
 from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
@@ -75,8 +76,8 @@ def cli() -> None:
 
 
 COMMANDS = (
-    calibrate, config, demo, detectors, doctor, events, gates, journal, policies, replay, reset, run, scenarios,
-    security, sensitivity, simulate, taxonomy, top, twin,
+    calibrate, campaign, config, demo, detectors, doctor, events, gates, journal, policies, replay, reset, run,
+    scenarios, security, sensitivity, simulate, taxonomy, top, twin,
 )  # fmt: skip
 for command in COMMANDS:
     cli.add_command(command)

@@ -7,23 +7,26 @@ reuses them by reset. Everything temporary lies in one scratch folder that the p
 from __future__ import annotations
 
 import gc
+import math
 import os
 import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures import TimeoutError as FutureTimeout
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import msgspec
 from pebble import ProcessExpired, ProcessPool
 
 from foreshock._strict import convert
-from foreshock.errors import ForeshockError, TwinError
+from foreshock.clock import monotonic_ns, seconds
+from foreshock.errors import BadInputError, ForeshockError, TwinError
 from foreshock.journal import Journal
 from foreshock.records import Intervention
 from foreshock.registry import Registry
@@ -33,7 +36,9 @@ from foreshock.session.simulate import simulate
 from foreshock.supervisor import Supervisor
 from foreshock.twin import Twin
 
-__all__ = ["Failure", "Job", "build_twin", "run_all", "run_one"]
+__all__ = ["Failure", "Job", "Source", "build_twin", "placed", "run_all", "run_one", "run_stream"]
+
+K = TypeVar("K", bound=Hashable)
 
 
 class Job(msgspec.Struct, frozen=True):
@@ -60,46 +65,55 @@ def build_twin(scenario: Scenario, registry: Registry, scratch: Path) -> Twin:
     """The twin that a scenario names, with its files in scratch."""
     place = f"{scenario.id}: twin"
     spec = registry.twin(scenario.twin["kind"], f"{place}.kind")
-    table = _placed({k: v for k, v in scenario.twin.items() if k != "kind"}, Path(scenario.folder))
+    table = placed({k: v for k, v in scenario.twin.items() if k != "kind"}, Path(scenario.folder))
     scratch.mkdir(parents=True, exist_ok=True)
     return spec.build(convert(table, spec.config, place), scenario.supervisor().supervisor.robot, scratch)
 
 
 _BENCH: dict[bytes, Any] = {}
-"""Twins and supervisors that this worker has built, by what they were built from."""
+"""Twins and supervisors that this worker has built, by what they were built from; the last used come last."""
+_ROOM = 24
+"""So many of them are kept: the arms of one scenario fit many times over."""
 
 
-def _placed(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+def placed(table: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A twin's table with its paths starting from a folder, those of its parts as well."""
-    placed = dict(table)
+    result = dict(table)
     for key in ("fmu", "binding", "plant"):
         value = table.get(key)
         if isinstance(value, str) and value and (key != "plant" or "/" in value):
-            placed[key] = str(folder / value)
+            result[key] = str(folder / value)
     parts = table.get("parts")
     if isinstance(parts, dict):
-        placed["parts"] = {k: _placed(v, folder) if isinstance(v, dict) else v for k, v in parts.items()}
-    return placed
+        result["parts"] = {k: placed(v, folder) if isinstance(v, dict) else v for k, v in parts.items()}
+    return result
 
 
 def _work(job: Job, scratch: str) -> Run:
     """In the worker: do one run, reusing what was built for the same twin and configuration."""
+    return _timed(job, scratch)[0]
+
+
+def _timed(job: Job, scratch: str) -> tuple[Run, float]:
+    """In the worker: one run, and its wall time in s without what was built for it."""
     registry: Registry = _BENCH.setdefault(b"registry", Registry())
     twin_key = msgspec.json.encode(("twin", job.scenario.twin, job.scenario.folder), order="sorted")
     if twin_key not in _BENCH:
-        folder = Path(scratch) / f"worker-{os.getpid()}-{len(_BENCH)}"
+        folder = Path(scratch) / f"worker-{os.getpid()}-{monotonic_ns()}"
         _BENCH[twin_key] = build_twin(job.scenario, registry, folder)
+    twin = _BENCH[twin_key] = _BENCH.pop(twin_key)
     judge: Supervisor | None = None
     if job.arm != "off":
         key = msgspec.json.encode(("supervisor", job.scenario.config), order="sorted")
         if key not in _BENCH:
             _BENCH[key] = Supervisor(job.scenario.supervisor(), Path(job.scenario.folder), registry)
         gc.freeze()  # a full collection would walk through all that set-up made, in the middle of a tick
-        judge = _BENCH[key]
+        judge = _BENCH[key] = _BENCH.pop(key)
+    _make_room()
     try:
-        twin = _BENCH[twin_key]
         with closing_all(_journals(job)) as journals:
-            return simulate(
+            begin_ns = monotonic_ns()
+            run = simulate(
                 job.scenario,
                 twin,
                 judge,
@@ -109,9 +123,17 @@ def _work(job: Job, scratch: str) -> Run:
                 scripted=job.scripted,
                 journals=journals,
             )
+            return run, seconds(monotonic_ns() - begin_ns)
     except TwinError:
         _BENCH.pop(twin_key).close()
         raise
+
+
+def _make_room() -> None:
+    """Close what was not used for longest; never the registry, nor what the run at hand needs, which comes last."""
+    while len(_BENCH) > _ROOM:
+        oldest = next(key for key in _BENCH if key != b"registry")
+        _BENCH.pop(oldest).close()
 
 
 def _journals(job: Job) -> list[Journal]:
@@ -152,9 +174,24 @@ def _quiet(scratch: str) -> None:
 
 
 @contextmanager
-def _scratch() -> Iterator[Path]:
-    with tempfile.TemporaryDirectory(prefix="foreshock-", ignore_cleanup_errors=True) as name:
+def _scratch(folder: Path | None = None) -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="foreshock-", dir=folder, ignore_cleanup_errors=True) as name:
         yield Path(name)
+
+
+@contextmanager
+def _pool(workers: int, scratch: Path) -> Iterator[ProcessPool]:
+    pool = ProcessPool(max_workers=workers, context=get_context("spawn"), initializer=_quiet, initargs=[str(scratch)])
+    try:
+        yield pool
+        pool.close()  # type: ignore[no-untyped-call]  # pebble has no types
+    finally:
+        pool.stop()  # type: ignore[no-untyped-call]  # as above
+        pool.join()
+
+
+def _limit_s(job: Job, timeout_s: float | None) -> float:
+    return 60.0 + 10.0 * job.scenario.duration_s if timeout_s is None else timeout_s
 
 
 def run_all(
@@ -176,31 +213,69 @@ def run_all(
         BadInputError: a job names something that does not exist: every job of its kind would fail.
     """
     results: list[Run | Failure] = []
-    with _scratch() as scratch:
-        pool = ProcessPool(
-            max_workers=workers, context=get_context("spawn"), initializer=_quiet, initargs=[str(scratch)]
-        )
-        try:
-            limits = [60.0 + 10.0 * job.scenario.duration_s if timeout_s is None else timeout_s for job in jobs]
-            futures = [
-                pool.schedule(_work, args=[job, str(scratch)], timeout=limit)
-                for job, limit in zip(jobs, limits, strict=True)
-            ]
-            for k, (job, future, limit) in enumerate(zip(jobs, futures, limits, strict=True)):
-                result = _result(job, future, limit, scratch)
-                results.append(result)
-                if done is not None:
-                    done(k, result)
-            pool.close()  # type: ignore[no-untyped-call]  # pebble has no types
-        finally:
-            pool.stop()  # type: ignore[no-untyped-call]  # as above
-            pool.join()
+    with _scratch() as scratch, _pool(workers, scratch) as pool:
+        limits = [_limit_s(job, timeout_s) for job in jobs]
+        futures = [
+            pool.schedule(_work, args=[job, str(scratch)], timeout=limit)
+            for job, limit in zip(jobs, limits, strict=True)
+        ]
+        for k, (job, future, limit) in enumerate(zip(jobs, futures, limits, strict=True)):
+            result = _result(job, future, limit, scratch)
+            results.append(result)
+            if done is not None:
+                done(k, result)
     return results
 
 
-def _result(job: Job, future: Any, timeout_s: float, scratch: Path) -> Run | Failure:
+class Source(Protocol[K]):
+    """What a stream of runs takes its jobs from and gives its results to; both may depend on each other."""
+
+    def next(self) -> tuple[K, Job] | None:
+        """The next job and a key to know it by; None if there is none now: asked again after each result."""
+
+    def done(self, key: K, result: Run | Failure, wall_s: float) -> None:
+        """A result, as soon as it is there; its wall time is NaN where it failed."""
+
+
+def run_stream(source: Source[K], workers: int = 1, timeout_s: float | None = None, folder: Path | None = None) -> None:
+    """Do jobs until there is none left and none runs; results in the order in which they come.
+
+    Unlike run_all, a job that names something which does not exist fails alone, as ``bad-input``.
+
+    Args:
+        source: gives jobs and takes results.
+        workers: number of processes.
+        timeout_s: as in run_all.
+        folder: where the scratch folder is made; the system's place for temporary files by default.
+    """
+    with _scratch(folder) as scratch, _pool(workers, scratch) as pool:
+        running: dict[Any, tuple[K, Job, float]] = {}
+        while True:
+            # one more than there are workers: none waits for this process to write its result down
+            while len(running) <= workers and (given := source.next()) is not None:
+                key, job = given
+                limit = _limit_s(job, timeout_s)
+                running[pool.schedule(_timed, args=[job, str(scratch)], timeout=limit)] = key, job, limit
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                key, job, limit = running.pop(future)
+                try:
+                    result = _result(job, future, limit, scratch)
+                except BadInputError as e:
+                    result = Failure(job, "bad-input", str(e))
+                except ForeshockError as e:
+                    result = Failure(job, "error", f"{type(e).__name__}: {e}")
+                if isinstance(result, tuple):
+                    source.done(key, *result)
+                else:
+                    source.done(key, result, math.nan)
+
+
+def _result(job: Job, future: Any, timeout_s: float, scratch: Path) -> Any:
+    """What the worker gave, or a Failure."""
     try:
-        run: Run = future.result()
+        return future.result()
     except FutureTimeout:
         late = f"no result within {timeout_s:g} s: hung, or slow (then raise the limit); killed"
         return Failure(job, "hang", late, _last_words(scratch))
@@ -214,7 +289,6 @@ def _result(job: Job, future: Any, timeout_s: float, scratch: Path) -> Run | Fai
         raise
     except Exception as e:  # noqa: BLE001 # whatever ends one run must not end the others
         return Failure(job, "error", f"{type(e).__name__}: {e}", _last_words(scratch))
-    return run
 
 
 def _last_words(scratch: Path, most: int = 4000) -> str:

@@ -66,6 +66,7 @@ class Run(msgspec.Struct, frozen=True):
         digest: of all decisions, empty if not asked for.
         max_level: highest protection level of the mode, or minimal risk.
         warnings: what of the configuration leaves the scenario's mode unwatched or unprotected.
+        peak_p: highest P of the mode before its accident; None if nobody judged.
     """
 
     scenario: str
@@ -88,6 +89,7 @@ class Run(msgspec.Struct, frozen=True):
     digest: str = ""
     max_level: int = 0
     warnings: tuple[str, ...] = ()
+    peak_p: float | None = None
 
     @property
     def harmed(self) -> bool:

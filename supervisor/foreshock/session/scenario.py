@@ -15,6 +15,7 @@ from foreshock._strict import convert, read_toml, within
 from foreshock.config import Config, parse_config
 from foreshock.errors import ConfigError, ForeshockError, nearest
 from foreshock.registry import Broken, Registry
+from foreshock.session.faults import Fault
 from foreshock.taxonomy import builtin_taxonomy
 
 __all__ = ["Distribution", "Scenario", "Severity", "broken_scenarios", "find_scenario", "load_scenario", "scenario_ids"]
@@ -81,6 +82,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         distributions: parameters that each seed draws anew.
         severity: the parameter to sweep, and its values; None if none was chosen.
         folder: where the file lies; relative paths start there.
+        faults: of sensors, messages, actuators and detectors.
     """
 
     id: str
@@ -94,6 +96,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     distributions: dict[str, Distribution] = {}
     severity: Severity | None = None
     folder: str = ""
+    faults: tuple[Fault, ...] = ()
 
     def __post_init__(self) -> None:
         within(f"{self.id}: duration_s", self.duration_s, 0.0, above=True)

@@ -10,6 +10,8 @@ from foreshock.clock import NS_PER_S, ns, seconds
 from foreshock.errors import ConfigError
 from foreshock.journal import DigestJournal, Journal
 from foreshock.records import Decision, Health, Intervention, ProtectionLevel
+from foreshock.session.crashes import Crashes
+from foreshock.session.faulty import FaultyTwin
 from foreshock.session.run import Arm, Run, TimelineRow
 from foreshock.session.scenario import Scenario
 from foreshock.supervisor import Supervisor
@@ -49,7 +51,7 @@ def simulate(
 
     Raises:
         TwinError: the twin failed.
-        ConfigError: the periods of twin and supervisor do not fit.
+        ConfigError: the periods of twin and supervisor do not fit, or a fault fits neither.
     """
     if scripted and arm == "on":
         raise ConfigError(scenario.id, "scripted interventions would meet those of the supervisor", "; take arm off")
@@ -63,6 +65,10 @@ def simulate(
             f"{scenario.id}: config.supervisor.period_s",
             f"{seconds(period):g} s is not a multiple of the twin's step of {seconds(twin.period_ns):g} s",
         )
+    if scenario.faults:
+        twin = FaultyTwin(twin, scenario.faults, scenario.id)
+    ids = [spec.id for spec in judge.detectors] if judge is not None else []
+    crashes = Crashes(scenario.faults if judge is not None else (), ids, seed, scenario.id)
     parameters = scenario.drawn(seed)
     twin.reset(parameters, seed)
     if judge is not None:
@@ -84,7 +90,7 @@ def simulate(
         events = twin.events()
         decision = None
         if judge is not None:
-            decision = judge.step(samples, now)
+            decision = judge.step(samples, now, crashes.at(now))
             for recorder in recorders:
                 recorder.tick(samples, decision, judge.verdicts_of(decision))
             if arm == "on":
@@ -124,6 +130,7 @@ def simulate(
         digest.digest if detail and judge is not None else "",
         log.max_level,
         warnings_of(judge, scenario.mode) if judge is not None else (),
+        log.peak_p,
     )
 
 
@@ -161,12 +168,15 @@ class _Log:
         self.rows: list[TimelineRow] = []
         self.series: dict[str, list[float]] = {}
         self.max_level = 0
+        self.peak_p: float | None = None
+        self._over = False
 
     def tick(self, now_ns: int, decision: Decision | None, events: Sequence[TwinEvent], twin: Twin) -> None:
         """Take one tick."""
         t = seconds(now_ns)
         news = tuple(f"{e.id} ({e.value:.0f} {e.unit})" if e.mode else e.id for e in events[self._events :])
         self._events = len(events)
+        self._over = self._over or any(e.mode == self._mode for e in events)
         if decision is not None:
             self._judged(t, decision, news)
         elif news and self._detail:
@@ -179,6 +189,8 @@ class _Log:
         mode = self._mode
         self.interventions += d.changes
         self.health += d.health
+        if not self._over:
+            self.peak_p = max(self.peak_p or 0.0, d.risk.by_mode[mode])
         level = d.level if d.level is ProtectionLevel.MINIMAL_RISK else d.levels[mode]
         self.max_level = max(self.max_level, level)
         for gate in (ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE):

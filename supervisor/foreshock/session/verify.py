@@ -14,12 +14,12 @@ from statistics import quantiles
 import msgspec
 import numpy as np
 
-from foreshock.clock import ns
 from foreshock.records import Intervention, ProtectionLevel
 from foreshock.session.isolated import Failure, Job, run_all
 from foreshock.session.rates import Frequency, Rate, per_hour, wilson
 from foreshock.session.run import Run
 from foreshock.session.scenario import Scenario
+from foreshock.session.scripted import held, moved
 from foreshock.taxonomy import builtin_taxonomy
 
 __all__ = ["AIMS", "Cascade", "ModeResult", "Plan", "plan_of", "verify"]
@@ -166,8 +166,10 @@ def _after(plan: Plan, every: Sequence[int], jobs: Sequence[Job], results: Seque
     """Runs that follow from the supervised ones: their actions at random and always; what protective levels averted."""
     n = len(every)
     on = results[n : 2 * n]
-    after = [Job(plan.accident, "off", s, False, _moved(r, plan.accident, s)) for s, r in zip(every, on, strict=True)]
-    after += [Job(plan.accident, "off", s, False, _held(r)) for s, r in zip(every, on, strict=True)]
+    pairs = [(s, _changes(r)) for s, r in zip(every, on, strict=True)]
+    duration_s = plan.accident.duration_s
+    after = [Job(plan.accident, "off", s, False, moved(changes, duration_s, s)) for s, changes in pairs]
+    after += [Job(plan.accident, "off", s, False, held(changes)) for s, changes in pairs]
     after += [
         Job(job.scenario, "off", job.seed, detail=False)
         for job, run in zip(jobs[2 * n :], results[2 * n :], strict=True)
@@ -234,19 +236,5 @@ def _quartiles(values: Sequence[float]) -> tuple[float, float, float] | None:
     return low, middle, high
 
 
-def _moved(run: Run | Failure, scenario: Scenario, seed: int) -> tuple[Intervention, ...]:
-    """The interventions of a supervised run, all moved so that the first comes at a random time."""
-    if isinstance(run, Failure) or not run.interventions:
-        return ()
-    at_s = np.random.default_rng([0x7265, seed]).uniform(0.0, scenario.duration_s)
-    by_ns = ns(at_s) - run.interventions[0].stamp_ns
-    return tuple(msgspec.structs.replace(i, stamp_ns=i.stamp_ns + by_ns) for i in run.interventions)
-
-
-def _held(run: Run | Failure) -> tuple[Intervention, ...]:
-    """Every action of a supervised run, from the start, as strong as it became."""
-    most: dict[str, Intervention] = {}
-    for i in () if isinstance(run, Failure) else run.interventions:
-        if i.action not in most or i.strength > most[i.action].strength:
-            most[i.action] = i
-    return tuple(msgspec.structs.replace(i, stamp_ns=0) for i in most.values())
+def _changes(result: Run | Failure) -> tuple[Intervention, ...]:
+    return () if isinstance(result, Failure) else result.interventions

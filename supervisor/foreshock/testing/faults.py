@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import Any
 
 import msgspec
 
-from foreshock.messages import AnyMessage
 from foreshock.records import Sample
+from foreshock.session.fields import not_a_number
 from foreshock.testing.rig import arrival_ns
 
 __all__ = ["disordered", "duplicated", "not_a_number", "silenced", "spoiled"]
@@ -57,19 +55,3 @@ def disordered(samples: Sequence[Sample]) -> tuple[Sample, ...]:
 
 def _arriving(sample: Sample, when: Sample) -> Sample:
     return msgspec.structs.replace(sample, received_ns=arrival_ns(when))
-
-
-def not_a_number(message: AnyMessage) -> AnyMessage:
-    """The message with NaN for each of its floats."""
-    value: AnyMessage = _spoil(message)
-    return value
-
-
-def _spoil(value: Any) -> Any:
-    if isinstance(value, float):
-        return math.nan
-    if isinstance(value, tuple):
-        return tuple(map(_spoil, value))
-    if isinstance(value, msgspec.Struct):
-        return msgspec.structs.replace(value, **{f: _spoil(getattr(value, f)) for f in value.__struct_fields__})
-    return value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -10,7 +10,7 @@ import msgspec
 from foreshock.hookspecs import hookimpl
 from foreshock.twin import Twin, TwinSpec
 
-__all__ = ["FmiTwinConfig", "build_twin", "foreshock_twins"]
+__all__ = ["FmiTwinConfig", "build_twin", "foreshock_twins", "twin_files"]
 
 
 class FmiTwinConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -42,7 +42,16 @@ def build_twin(config: FmiTwinConfig, robot: str, scratch: Path) -> Twin:
     return build(config, robot, scratch)
 
 
+def twin_files(config: FmiTwinConfig) -> Mapping[str, Path]:
+    """The FMU, built if it is a plant's, and the binding."""
+    from foreshock_twins.fmi._build import files_of
+
+    fmu, binding = files_of(config)
+    return {"fmu": fmu, "binding": binding}
+
+
 @hookimpl
 def foreshock_twins() -> Sequence[TwinSpec]:
     """The twin kind ``fmu``."""
-    return [TwinSpec(id="fmu", build=build_twin, config=FmiTwinConfig, summary="A co-simulation FMU, FMI 2.0 or 3.0")]
+    summary = "A co-simulation FMU, FMI 2.0 or 3.0"
+    return [TwinSpec(id="fmu", build=build_twin, config=FmiTwinConfig, summary=summary, files=twin_files)]

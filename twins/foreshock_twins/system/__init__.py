@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -11,7 +11,7 @@ import msgspec
 from foreshock.hookspecs import hookimpl
 from foreshock.twin import Twin, TwinSpec
 
-__all__ = ["ConnectionConfig", "FmuSystemConfig", "PartConfig", "build_twin", "foreshock_twins"]
+__all__ = ["ConnectionConfig", "FmuSystemConfig", "PartConfig", "build_twin", "foreshock_twins", "twin_files"]
 
 
 class PartConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -74,8 +74,15 @@ def build_twin(config: FmuSystemConfig, robot: str, scratch: Path) -> Twin:
     return build(config, robot, scratch)
 
 
+def twin_files(config: FmuSystemConfig) -> Mapping[str, Path]:
+    """The FMU of every part, built if it is a plant's, and the binding."""
+    from foreshock_twins.system._build import file_of
+
+    return {**{f"fmu {k}": file_of(k, part) for k, part in config.parts.items()}, "binding": Path(config.binding)}
+
+
 @hookimpl
 def foreshock_twins() -> Sequence[TwinSpec]:
     """The twin kind ``fmu-system``."""
     summary = "Several co-simulation FMUs, outputs connected to inputs"
-    return [TwinSpec(id="fmu-system", build=build_twin, config=FmuSystemConfig, summary=summary)]
+    return [TwinSpec(id="fmu-system", build=build_twin, config=FmuSystemConfig, summary=summary, files=twin_files)]

@@ -18,7 +18,7 @@ from foreshock_twins.system._connections import connect, order_of
 from foreshock_twins.system._parts import Part, SystemVariables
 from foreshock_twins.system._stepper import FmuSystem, layouts_of
 
-__all__ = ["build"]
+__all__ = ["build", "file_of"]
 
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
@@ -34,7 +34,7 @@ def build(config: FmuSystemConfig, robot: str, scratch: Path) -> FmuTwin:
         raise ConfigError("twin.parts", "is empty", "; expected [twin.parts.<name>] tables")
     files, opened, parts = {}, {}, []
     for name, entry in config.parts.items():
-        files[name] = _file(name, entry)
+        files[name] = file_of(name, entry)
         opened[name] = open_fmu(files[name], scratch)
         parts.append(Part.of(name, opened[name][0], files[name].name, entry.seed))
     connections = connect(config.connections, parts)
@@ -62,7 +62,7 @@ def build(config: FmuSystemConfig, robot: str, scratch: Path) -> FmuTwin:
     return FmuTwin(robot, variables, binding, layout, system, log)
 
 
-def _file(name: str, part: PartConfig) -> Path:
+def file_of(name: str, part: PartConfig) -> Path:
     """The FMU of a part, built if it is a plant."""
     place = f"twin.parts.{name}"
     if not _NAME.fullmatch(name):

@@ -1,0 +1,175 @@
+"""Two campaigns against each other: where a result got significantly worse."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import msgspec
+
+from foreshock.campaign.ledger import Row
+from foreshock.campaign.paired import holm, mcnemar
+from foreshock.campaign.plan import Plan
+from foreshock.campaign.results import Scope, acted_s, scopes_of
+from foreshock.campaign.spec import ArmEntry
+
+__all__ = ["LEVEL", "Change", "compare"]
+
+LEVEL = 0.05
+"""Chance that any result is called worse where nothing has changed."""
+
+Seat = tuple[str, str, int, int, str]
+Event = Callable[[Row], bool]
+
+
+class Change(msgspec.Struct, frozen=True):
+    """How one metric of one arm changed in one part.
+
+    Attributes:
+        scope: overall, or a mode.
+        arm: id.
+        metric: ``accidents``, ``false-interventions``, ``lead-time`` or ``failures``.
+        before: value in the first campaign: a rate, or a median in s; NaN if there is none.
+        after: in the second.
+        n: runs that were compared.
+        paired: whether the same runs were compared, one by one.
+        p: one-sided, that it did not get worse, adjusted for the number of comparisons (Holm).
+    """
+
+    scope: Scope
+    arm: str
+    metric: str
+    before: float
+    after: float
+    n: int
+    paired: bool
+    p: float
+
+    @property
+    def worse(self) -> bool:
+        """Whether it is significantly worse."""
+        return self.p < LEVEL
+
+
+def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]]) -> list[Change]:
+    """Every metric of the arms that both campaigns have, overall and per mode.
+
+    Runs of the same scenario, parameters, fault, seed and arm are compared one by one (McNemar; Wilcoxon's signed ranks
+    for lead times); where the campaigns share none, as independent samples (Fisher's exact test; Mann and Whitney's).
+
+    Args:
+        before: plan and rows of the first campaign.
+        after: of the second.
+    """
+    arms = {a.id: a for a in before[0].spec.arms}
+    shared = [a for a in after[0].spec.arms if a.id in arms]
+    sides = [_Side(*before), _Side(*after)]
+    found: list[Change] = []
+    scopes = [s for s in scopes_of([*before[1], *after[1]]) if s[0].kind in ("overall", "mode")]
+    for scope, belongs in scopes[1:] if len(scopes) == 2 else scopes:  # one mode is the whole
+        for arm in shared:
+            first, second = (side.rows(arm, belongs) for side in sides)
+            if first and second:
+                found += _changes(scope, arm.id, sides, first, second)
+    adjusted = holm([c.p for c in found])
+    return [msgspec.structs.replace(c, p=p) for c, p in zip(found, adjusted, strict=True)]
+
+
+class _Side:
+    """One campaign: its arms, and the reference run of each run."""
+
+    def __init__(self, plan: Plan, rows: Sequence[Row]) -> None:
+        self._arms: Mapping[str, ArmEntry] = {a.id: a for a in plan.spec.arms}
+        self._all = rows
+        reference = plan.spec.reference_arm
+        self._reference = {
+            (r.scenario, r.point, r.replicate, r.fault): r
+            for r in rows
+            if reference is not None and r.arm == reference.id and r.ok
+        }
+
+    def rows(self, arm: ArmEntry, belongs: Event) -> dict[Seat, Row]:
+        """Runs of an arm by what makes them comparable."""
+        return {_seat(r): r for r in self._all if r.arm == arm.id and belongs(r)}
+
+    def _partner(self, row: Row) -> Row | None:
+        return self._reference.get((row.scenario, row.point, row.replicate, row.fault))
+
+    def false(self, row: Row) -> bool | None:
+        """Whether it is a false intervention; None where the reference came to harm."""
+        partner = self._partner(row)
+        if partner is None or partner.event_s is not None or not row.ok:
+            return None
+        return acted_s(row, self._arms[row.arm]) is not None
+
+    def lead_s(self, row: Row) -> float | None:
+        """Time from the intervention to the reference's accident."""
+        partner, at_s = self._partner(row), acted_s(row, self._arms[row.arm])
+        return None if partner is None or partner.accident_s is None or at_s is None else partner.accident_s - at_s
+
+
+def _seat(row: Row) -> Seat:
+    parameters = ",".join(f"{k}={v!r}" for k, v in sorted(row.parameters.items()))
+    return row.scenario, parameters, row.seed, row.replicate, row.fault
+
+
+def _changes(
+    scope: Scope, arm: str, sides: Sequence[_Side], first: Mapping[Seat, Row], second: Mapping[Seat, Row]
+) -> list[Change]:
+    found = []
+    events: dict[str, list[Callable[[Row], bool | None]]] = {
+        "accidents": [lambda r: r.accident, lambda r: r.accident],
+        "false-interventions": [sides[0].false, sides[1].false],
+        "failures": [lambda r: not r.ok, lambda r: not r.ok],
+    }
+    for metric, (of_first, of_second) in events.items():
+        a = {k: v for k, r in first.items() if (v := of_first(r)) is not None}
+        b = {k: v for k, r in second.items() if (v := of_second(r)) is not None}
+        if a and b:
+            found.append(_of_events(scope, arm, metric, a, b))
+    x, y = (
+        {k: lead_s for k, r in rows.items() if (lead_s := side.lead_s(r)) is not None}
+        for side, rows in zip(sides, (first, second), strict=True)
+    )
+    if x and y:
+        found.append(_of_times(scope, arm, x, y))
+    return found
+
+
+def _of_events(scope: Scope, arm: str, metric: str, a: Mapping[Seat, bool], b: Mapping[Seat, bool]) -> Change:
+    both = [k for k in a if k in b]
+    if both:
+        first, second = [a[k] for k in both], [b[k] for k in both]
+        pairs = list(zip(first, second, strict=True))
+        p = mcnemar(sum(f and not s for f, s in pairs), sum(s and not f for f, s in pairs), greater=True)
+    else:
+        from scipy.stats import fisher_exact
+
+        first, second = list(a.values()), list(b.values())
+        counts = [[sum(v), len(v) - sum(v)] for v in (second, first)]
+        p = float(fisher_exact(counts, alternative="greater").pvalue)
+    return Change(scope, arm, metric, _mean(first), _mean(second), len(second), bool(both), p)
+
+
+def _of_times(scope: Scope, arm: str, a: Mapping[Seat, float], b: Mapping[Seat, float]) -> Change:
+    from scipy.stats import mannwhitneyu, wilcoxon
+
+    both = [k for k in a if k in b]
+    if both:
+        x, y = [a[k] for k in both], [b[k] for k in both]
+        less = [v - u for u, v in zip(x, y, strict=True)]
+        p = float(wilcoxon(less, alternative="less").pvalue) if any(less) else 1.0
+    else:
+        x, y = list(a.values()), list(b.values())
+        p = float(mannwhitneyu(y, x, alternative="less").pvalue)
+    return Change(scope, arm, "lead-time", _median(x), _median(y), len(y), bool(both), p)
+
+
+def _mean(values: Sequence[bool]) -> float:
+    return sum(values) / len(values) if values else math.nan
+
+
+def _median(values: Sequence[float]) -> float:
+    from statistics import median
+
+    return median(values) if values else math.nan

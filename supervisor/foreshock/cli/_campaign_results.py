@@ -1,0 +1,89 @@
+"""How the results of a campaign, and of a comparison, are printed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from foreshock.campaign.compare import Change
+from foreshock.campaign.export import flat_result
+from foreshock.campaign.results import ArmResult, frequency, shown
+from foreshock.campaign.spec import CampaignSpec
+from foreshock.cli.output import console, table
+
+__all__ = ["print_changes", "print_results", "results_json"]
+
+
+def results_json(results: Sequence[ArmResult]) -> list[dict[str, Any]]:
+    """Results as one level of keys, as in results.parquet."""
+    return [flat_result(r) for r in results]
+
+
+def print_results(spec: CampaignSpec, results: Sequence[ArmResult]) -> None:
+    """The table of arms, overall and per mode, with the metrics that the campaign asks for."""
+    columns = {
+        "accidents": ("accidents",),
+        "difference": ("difference", "p"),
+        "prevented": ("prevented", "caused"),
+        "lead-time": ("lead (s)",),
+        "false-interventions": ("false per hour",),
+        "brier": ("Brier",),
+        "failures": ("no result",),
+    }
+    wanted = [c for metric in spec.metrics for c in columns[metric]]
+    rows = []
+    for r in shown(results):
+        cells = _cells(r)
+        rows.append((r.scope.name or "overall", r.arm, *(cells[c] for c in wanted)))
+    reference = spec.reference_arm
+    against = f", paired with {reference.id}" if reference is not None else ""
+    table(f"{spec.id}: 95% intervals{against}", "part", "arm", *wanted, rows=rows, right=tuple(wanted))
+
+
+def _cells(r: ArmResult) -> Mapping[str, str]:
+    d, lead = r.difference, r.lead_quartiles_s
+    told = d is not None and d.n > 0
+    return {
+        "accidents": str(r.accidents),
+        "difference": f"{100 * d.difference:+.0f} ({100 * d.low:+.0f}..{100 * d.high:+.0f})" if d and told else "–",
+        "p": f"{d.p:.2g}" if d and told else "–",
+        "prevented": str(r.prevented) if d is not None else "–",
+        "caused": str(r.caused) if d is not None else "–",
+        "lead (s)": f"{lead[1]:.2f}" if lead is not None else "–",
+        "false per hour": frequency(r.false),
+        "Brier": f"{r.brier.score:.3f}" if r.brier is not None else "–",
+        "no result": str(r.failures),
+    }
+
+
+def print_changes(changes: Sequence[Change]) -> None:
+    """What differs, worst first, and how much was compared."""
+    same = sum(c.p >= 1.0 and not c.worse for c in changes)
+    console.print(
+        f"{len(changes)} results compared, {len(changes) - same} with any sign of getting worse", markup=False
+    )
+    rows = [
+        (
+            c.scope.name or "overall",
+            c.arm,
+            c.metric,
+            *(_value(c, v) for v in (c.before, c.after)),
+            f"{c.n}{' pairs' if c.paired else ''}",
+            f"{c.p:.2g}",
+            "worse" if c.worse else "",
+        )
+        for c in sorted(changes, key=lambda c: c.p)
+        if c.p < 1.0
+    ]
+    columns = ("part", "arm", "metric", "before", "after", "runs", "p", "")
+    if rows:
+        table(
+            "Second against first; p one-sided, adjusted by Holm", *columns, rows=rows, right=("before", "after", "p")
+        )
+
+
+def _value(change: Change, value: float) -> str:
+    if math.isnan(value):
+        return "–"
+    return f"{value:.2f} s" if change.metric == "lead-time" else f"{100 * value:.1f}%"

@@ -1,0 +1,290 @@
+"""``foreshock campaign``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+
+from foreshock.campaign.again import Again, case_of
+from foreshock.campaign.again import rerun as rerun_case
+from foreshock.campaign.compare import compare as compare_campaigns
+from foreshock.campaign.engine import Campaign, Estimate, Progress, begin, execute, refuse_changes, reopen
+from foreshock.campaign.ledger import Row
+from foreshock.campaign.plan import Case
+from foreshock.campaign.report import write_results
+from foreshock.campaign.results import ArmResult
+from foreshock.campaign.spec import campaign_schema, load_campaign, shipped
+from foreshock.cli._campaign_results import print_changes, print_results, results_json
+from foreshock.cli.output import FAILED, NEGATIVE, OK, console, emit, notes, table
+from foreshock.cli.simulate_cmd import summary, timeline
+from foreshock.errors import BadInputError, MissingExtraError
+from foreshock.registry import Registry
+from foreshock.session.isolated import Failure
+from foreshock.session.run import Run
+
+__all__ = ["campaign"]
+
+folder_argument = click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
+workers_option = click.option(
+    "--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes."
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+
+
+@click.group()
+def campaign() -> None:
+    """Test campaigns: scenarios, factors and arms on the same seeds; durable, resumable, with statistics."""
+
+
+@campaign.command("list")
+@json_option
+def list_(as_json: bool) -> None:
+    """List the campaigns that come with Foreshock."""
+    found = {id_: load_campaign(id_)[0] for id_ in shipped()}
+    if as_json:
+        emit([{"id": id_, "title": spec.title, "file": shipped()[id_]} for id_, spec in found.items()])
+        return
+    table("Campaigns", "id", "what", rows=[(id_, spec.title) for id_, spec in found.items()])
+
+
+@campaign.command()
+def schema() -> None:
+    """Print the JSON schema of a campaign file."""
+    click.echo(msgspec.json.format(msgspec.json.encode(campaign_schema(), order="sorted"), indent=2).decode())
+
+
+@campaign.command()
+@click.argument("spec")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of the campaign.")
+@workers_option
+@json_option
+def run(spec: str, out: Path, workers: int, as_json: bool) -> int:
+    """Begin a campaign: SPEC is a TOML file, or the id of one that comes with Foreshock.
+
+    Exit code 3 if a run gave no result; the others are not affected.
+    """
+    parsed, origin = load_campaign(spec)
+    return _go(begin(parsed, origin, out, Registry()), workers, as_json)
+
+
+@campaign.command()
+@folder_argument
+@click.option("--accept", is_flag=True, help="Go on although something has changed; what depends on it is run again.")
+@click.option("--retry", is_flag=True, help="Do runs again that gave no result.")
+@workers_option
+@json_option
+def resume(folder: Path, accept: bool, retry: bool, workers: int, as_json: bool) -> int:
+    """Go on with a campaign that was broken off; the result is the same as without the break."""
+    found, changed = reopen(folder, Registry(), accept=accept)
+    if not accept:
+        refuse_changes(folder, changed)
+    return _go(found, workers, as_json, retry=retry)
+
+
+@campaign.command()
+@folder_argument
+@json_option
+def status(folder: Path, as_json: bool) -> int:
+    """Say how far a campaign is, and what failed."""
+    found, changed = reopen(folder, Registry())
+    rows = found.rows()
+    state = _state(found, rows, changed)
+    if as_json:
+        emit(state)
+        return OK
+    _print_state(state, rows)
+    return OK
+
+
+@campaign.command()
+@folder_argument
+@json_option
+def report(folder: Path, as_json: bool) -> int:
+    """Write runs.parquet, results.parquet and report.html into DIR, and print the results.
+
+    Also of a campaign that is not complete.
+    """
+    found, _ = reopen(folder, Registry())
+    results, paths = write_results(found)
+    if as_json:
+        emit({"results": results_json(results), "files": [str(p) for p in paths]})
+        return OK
+    print_results(found.plan.spec, results)
+    for path in paths:
+        console.print(str(path), markup=False)
+    return OK
+
+
+@campaign.command()
+@click.argument("first", type=click.Path(path_type=Path, file_okay=False), metavar="A")
+@click.argument("second", type=click.Path(path_type=Path, file_okay=False), metavar="B")
+@json_option
+def compare(first: Path, second: Path, as_json: bool) -> int:
+    """Hold campaign B against campaign A, run by run where they share runs.
+
+    Exit code 1 if a result of B is significantly worse: more accidents or false interventions, less lead time, more
+    runs without a result.
+    """
+    registry = Registry()
+    sides = [reopen(folder, registry)[0] for folder in (first, second)]
+    changes = compare_campaigns(*((c.plan, c.recorded()) for c in sides))
+    if as_json:
+        emit([{**msgspec.to_builtins(c), "worse": c.worse} for c in changes])
+    elif changes:
+        print_changes(changes)
+    else:
+        console.print("they have no arm in common")
+    return NEGATIVE if any(c.worse for c in changes) else OK
+
+
+@campaign.command()
+@folder_argument
+@click.argument("key")
+@click.option("--report", "page", type=click.Path(path_type=Path, dir_okay=False), help="Write an HTML report here.")
+@click.option("--journal", type=click.Path(path_type=Path, dir_okay=False), help="Record the run in this MCAP file.")
+@json_option
+def rerun(folder: Path, key: str, page: Path | None, journal: Path | None, as_json: bool) -> int:
+    """Run one run of DIR again, in full detail: KEY is the beginning of its key, as in the report.
+
+    Exit code 1 if it is not what the ledger says.
+    """
+    found, changed = reopen(folder, Registry())
+    case = case_of(found, key, changed)
+    again = rerun_case(found, case, journal)
+    if as_json:
+        result = again.result
+        shown = msgspec.structs.replace(result, series={}) if isinstance(result, Run) else _failure(result)
+        emit({"case": case, "result": shown, "differs": again.differs, "known": again.known, "changed": changed})
+    else:
+        _print_again(again, changed)
+    if page is not None and isinstance(again.result, Run):
+        _page(page, again.result, case)
+    return NEGATIVE if again.differs else OK
+
+
+def _failure(failure: Failure) -> dict[str, str]:
+    return {"kind": failure.kind, "detail": failure.detail, "log": failure.log}
+
+
+def _page(path: Path, run: Run, case: Case) -> None:
+    try:
+        from foreshock.report import write_report
+    except ImportError as e:
+        raise BadInputError("--report", f"needs {e.name}", "; run: pip install 'foreshock[report]'") from e
+    write_report(path, f"{case.scenario}, arm {case.arm}, seed {case.seed}", [(case.arm, run)])
+    console.print(f"report: {path}", markup=False)
+
+
+def _print_again(again: Again, changed: list[str]) -> None:
+    case, result = again.case, again.result
+    if isinstance(result, Run):
+        timeline(result, f"{case.key}: {case.scenario}, arm {case.arm}, seed {case.seed}")
+        console.print(summary(result), soft_wrap=True)
+    else:
+        console.print(f"{result.kind}: {result.detail}", markup=False)
+    for line in changed:
+        console.print(f"changed since it was begun: {line}", markup=False)
+    if not again.known:
+        console.print("the ledger has no result of it yet")
+    elif not again.differs:
+        console.print("the same as in the ledger")
+    for name, (before, now) in again.differs.items():
+        console.print(f"differs: {name} was {before}, is {now}", markup=False, style="red")
+
+
+def _go(found: Campaign, workers: int, as_json: bool, *, retry: bool = False) -> int:
+    total = len(found.plan.cases)
+    with _bar(total, as_json) as (estimated, told):
+        complete = execute(found, workers, estimated=estimated, told=told, retry=retry)
+    rows = found.rows()
+    state = _state(found, rows, [])
+    results: list[ArmResult] = []
+    files: list[str] = []
+    try:
+        results, paths = write_results(found)
+        files = [str(p) for p in paths]
+    except MissingExtraError as e:
+        notes.print(f"no report: {e}", markup=False)
+    if as_json:
+        emit({**state, "complete": complete, "results": results_json(results), "files": files})
+    else:
+        if results:
+            print_results(found.plan.spec, results)
+        _print_state(state, rows)
+        for path in files:
+            console.print(path, markup=False)
+    if not complete:
+        notes.print(f"the budget of wall time is used up; go on with: foreshock campaign resume {found.folder}")
+    return FAILED if any(not r.ok for r in rows) else OK
+
+
+def _state(found: Campaign, rows: list[Row], changed: list[str]) -> dict[str, Any]:
+    failed: dict[str, int] = {}
+    for row in rows:
+        if not row.ok:
+            failed[row.status] = failed.get(row.status, 0) + 1
+    return {
+        "campaign": found.plan.spec.id,
+        "folder": str(found.folder),
+        "planned": len(found.plan.cases),
+        "done": len(rows),
+        "failed": failed,
+        "simulated_h": sum(r.end_s or 0.0 for r in rows) / 3600.0,
+        "changed": changed,
+    }
+
+
+def _print_state(state: dict[str, Any], rows: list[Row]) -> None:
+    failed = ", ".join(f"{n} {kind}" for kind, n in sorted(state["failed"].items())) or "none failed"
+    console.print(
+        f"{state['campaign']}: {state['done']} of {state['planned']} runs, {state['simulated_h']:.2f} h simulated; "
+        f"{failed}",
+        markup=False,
+    )
+    for line in state["changed"]:
+        console.print(f"changed since it was begun: {line}", markup=False)
+    for row in [r for r in rows if not r.ok][:8]:
+        console.print(f"  {row.key} {row.scenario} {row.arm} seed {row.seed}: {row.status}: {row.detail}", markup=False)
+
+
+@contextmanager
+def _bar(total: int, quiet: bool) -> Iterator[tuple[Callable[[Estimate], None], Callable[[Progress], None]]]:
+    """A progress bar with rate, time left and failures; and the estimate before the bulk of it."""
+    with Bar(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]:.1f} runs/s"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[failed]} failed"),
+        console=notes,
+        transient=True,
+        disable=quiet,
+    ) as bar:
+        task = bar.add_task("campaign", total=total, failed=0, rate=0.0)
+
+        def estimated(e: Estimate) -> None:
+            if not quiet:
+                notes.print(
+                    f"{e.runs} runs of {e.simulated_s / 3600.0:.2f} h simulated are left; estimate: {_time(e.wall_s)}"
+                )
+
+        def told(p: Progress) -> None:
+            bar.update(task, completed=p.done, failed=p.failed, rate=p.rate_hz)
+
+        yield estimated, told
+
+
+def _time(wall_s: float) -> str:
+    if not wall_s >= 90.0:
+        return f"{wall_s:.0f} s"
+    return f"{wall_s / 60.0:.0f} min" if wall_s < 5400.0 else f"{wall_s / 3600.0:.1f} h"

@@ -1,0 +1,141 @@
+"""The commands of a campaign: results do not depend on workers, and every point of the report leads to its command."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import msgspec
+import pyarrow.parquet as pq
+import pytest
+
+CHROMIUM = shutil.which("chromium")
+
+
+def foreshock(*words: str, code: int = 0) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", "from foreshock.cli import main; main()", "campaign", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        env={**os.environ, "COLUMNS": "200"},
+    )
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def smoke(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("smoke") / "out"
+    foreshock("run", "smoke", "--out", str(folder), "--workers", "1")
+    return folder
+
+
+class _Links(HTMLParser):
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.ids: set[str] = set()
+        self.targets: list[str] = []
+        self.outside: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        if found.get("id"):
+            self.ids.add(str(found["id"]))
+        for name in ("href", "src"):
+            if value := found.get(name):
+                (self.targets if value.startswith("#") else self.outside).append(value)
+        assert tag != "script"
+
+
+def test_every_point_of_the_report_leads_to_a_command_that_runs_it_again(smoke: Path) -> None:
+    page = (smoke / "report.html").read_text()
+    links = _Links(page)
+    assert links.outside == []
+    assert {t[1:] for t in links.targets} <= links.ids
+    table = pq.read_table(smoke / "runs.parquet").to_pylist()
+    assert len(table) == 30
+    for row in table:
+        assert f"r-{row['key']}" in {t[1:] for t in links.targets}
+        assert f"foreshock campaign rerun {smoke} {row['key']}" in page
+    key = next(r["key"] for r in table if r["arm"] == "random" and r["accident"])
+    assert "the same as in the ledger" in foreshock("rerun", str(smoke), key)
+    said = json.loads(foreshock("rerun", str(smoke), "", "--json", code=2))
+    assert "several runs begin with ''" in said["errors"][0]["message"]
+
+
+def _finite(row: dict[str, object]) -> dict[str, object]:
+    """Without what JSON cannot say, which is null there."""
+    return {k: v for k, v in row.items() if v is not None and not (isinstance(v, float) and not math.isfinite(v))}
+
+
+def test_results_are_what_was_run_and_parquet_says_the_same_as_json(smoke: Path) -> None:
+    status = json.loads(foreshock("status", str(smoke), "--json"))["result"]
+    assert (status["planned"], status["done"], status["failed"], status["changed"]) == (30, 30, {}, [])
+    results = json.loads(foreshock("report", str(smoke), "--json"))["result"]["results"]
+    stored = pq.read_table(smoke / "results.parquet").to_pylist()
+    assert [_finite(row) for row in stored] == [_finite(row) for row in results]
+    overall = {r["arm"]: r for r in results if r["scope"] == "overall"}
+    # A1 unsupervised falls at drop_duration 0.475 and not at 0.1; what is done in time saves it
+    assert (overall["none"]["accidents.k"], overall["on"]["accidents.k"]) == (2, 0)
+    # judging alone changes nothing
+    assert overall["shadow"]["difference.only_first"] == overall["shadow"]["difference.only_second"] == 0
+
+
+def test_results_do_not_depend_on_the_number_of_workers(campaign_file: Path, tmp_path: Path) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    for folder, workers in ((one, "1"), (two, "2")):
+        foreshock("run", str(campaign_file), "--out", str(folder), "--workers", workers)
+    tables = [pq.read_table(f / "runs.parquet").drop_columns(["wall_s"]) for f in (one, two)]
+    assert tables[0].num_rows == 60
+    assert tables[0].equals(tables[1])
+    assert "0 with any sign of getting worse" in foreshock("compare", str(one), str(two))
+
+
+def test_a_campaign_that_got_worse_fails_the_comparison(smoke: Path, tmp_path: Path) -> None:
+    import sqlite3
+
+    worse = tmp_path / "worse"
+    many = tmp_path / "many"
+    spec = Path(tmp_path / "many.toml")
+    spec.write_text(
+        'id = "many"\nreplicates = 8\n[[scenarios]]\nuse = "a1-fall-onto-human"\nduration_s = 0.05\n'
+        '[[arms]]\nid = "none"\nkind = "none"\n'
+    )
+    foreshock("run", str(spec), "--out", str(many), "--workers", "1")
+    shutil.copytree(many, worse)
+    with sqlite3.connect(worse / "ledger.sqlite") as db:  # as if every run had ended in the accident
+        for key, row in db.execute("select key, row from runs").fetchall():
+            data = msgspec.json.decode(row)
+            data |= {"accident": True, "accident_s": 0.04, "event_s": 0.04, "outcome": "fall-onto-human"}
+            db.execute("update runs set row = ? where key = ?", (msgspec.json.encode(data), key))
+    assert "worse" in foreshock("compare", str(many), str(worse), code=1)
+    foreshock("compare", str(worse), str(many))
+    key = pq.read_table(many / "runs.parquet").to_pylist()[0]["key"]
+    said = json.loads(foreshock("rerun", str(worse), key, "--json", code=1))["result"]
+    assert said["differs"]["accident"] == [True, False]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium")
+def test_a_browser_shows_the_report(smoke: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [
+            *(str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}"),
+            *("--dump-dom", (smoke / "report.html").resolve().as_uri()),
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    assert len(re.findall(r"<rect[^>]* class=\"(?:calm|accident|event|failed)\"", done.stdout)) == 30 + 4
+    assert done.stdout.count("<h2") == 5
