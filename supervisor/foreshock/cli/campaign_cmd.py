@@ -139,7 +139,7 @@ def compare(first: Path, second: Path, as_json: bool) -> int:
     """
     registry = Registry()
     sides = [reopen(folder, registry)[0] for folder in (first, second)]
-    changes = compare_campaigns(*((c.plan, c.recorded()) for c in sides))
+    changes = compare_campaigns(*((c.plan, c.rows()) for c in sides))
     if as_json:
         emit([{**msgspec.to_builtins(c), "worse": c.worse} for c in changes])
     elif changes:
