@@ -104,8 +104,9 @@ def test_a_change_is_named_and_only_what_depends_on_it_runs_again(campaign_file:
     assert execute(found, 1)
     scenario = tmp_path / "rogue.toml"
     scenario.write_text(scenario.read_text() + "[parameters]\nfrom = 0.02\n")
-    _, changed = reopen(folder, Registry())
+    as_it_was, changed = reopen(folder, Registry())
     assert changed == ["scenarios.rogue.parameters.from is new"]
+    assert as_it_was.rows() == found.rows()  # can still be reported and compared
     with pytest.raises(ConfigError, match=r"is not what it was.*\n.*parameters.from is new"):
         refuse_changes(folder, changed)
     again, _ = reopen(folder, Registry(), accept=True)

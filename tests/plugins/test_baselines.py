@@ -63,6 +63,9 @@ def test_speed_and_separation_acts_on_a_breach_that_lasts_or_is_lost_from_sight(
     assert not acts(policy, seen(BREACH, phase="cleared"))
     assert acts(policy, seen(BREACH, phase="cleared", frozen=True))
     assert not acts(policy, seen(SLIP), seen(TORSO), seen(COM), time_s=0.0)
+    wider = SpeedSeparation(SpeedSeparationConfig("A1", kinds=("narrowing-clearance",)))
+    assert acts(wider, seen("narrowing-clearance"))
+    assert not acts(wider, seen(BREACH))
 
 
 def test_the_capture_point_acts_on_a_near_fall_or_a_deviating_centre_of_mass() -> None:
@@ -108,6 +111,8 @@ def test_a_formula_about_the_past_and_one_about_severity() -> None:
         (ReactiveStopConfig, {}, "mode"),
         (SpeedSeparationConfig, {"mode": "A6", "actions": ["protective-stp"]}, "did you mean 'protective-stop'"),
         (SpeedSeparationConfig, {"mode": "A6", "actions": []}, "actions: empty"),
+        (SpeedSeparationConfig, {"mode": "A6", "kinds": []}, "kinds: empty"),
+        (SpeedSeparationConfig, {"mode": "A6", "kinds": ["human-proximity"]}, "did you mean 'human-proximity-breach'"),
         (CapturePointConfig, {"within_s": float("nan")}, "within_s: nan is not a finite number above 0"),
         (CapturePointConfig, {"withn_s": 0.1}, "did you mean 'within_s'"),
         (StlConfig, {"mode": "A1", "step_s": 2.0}, "step_s: 2.0 is not a finite number at least 0.001 and at most 1.5"),

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import msgspec
 
+from foreshock.errors import ConfigError
 from foreshock.policy import Proposal, Situation
+from foreshock.taxonomy import builtin_taxonomy
 from foreshock_detectors.baselines._protective import Protective, check
 
 __all__ = ["SpeedSeparation", "SpeedSeparationConfig"]
@@ -15,13 +17,24 @@ BREACH = "human-proximity-breach"
 
 
 class SpeedSeparationConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """mode: whose actions it takes; actions: what it does, None takes the mode's protective actions."""
+    """Settings.
+
+    Attributes:
+        mode: whose actions it takes.
+        actions: what it does; None takes the mode's protective actions.
+        kinds: what says that a separation is not kept.
+    """
 
     mode: str
     actions: tuple[str, ...] | None = None
+    kinds: tuple[str, ...] = (BREACH,)
 
     def __post_init__(self) -> None:
         check(self.mode, self.actions)
+        if not self.kinds:
+            raise ConfigError("kinds", "empty; nothing would ever trigger it")
+        for kind in self.kinds:
+            builtin_taxonomy().kind(kind, "kinds")
 
 
 class SpeedSeparation:
@@ -35,11 +48,12 @@ class SpeedSeparation:
 
     def __init__(self, config: SpeedSeparationConfig) -> None:
         self._do = Protective(config.mode, config.actions)
+        self._kinds = frozenset(builtin_taxonomy().kind(k).id for k in config.kinds)
 
     def propose(self, situation: Situation) -> Sequence[Proposal]:
         """What holds now."""
-        near = [p for p in situation.precursors if p.kind == BREACH and (p.phase != "cleared" or p.frozen)]
+        near = [p for p in situation.precursors if p.kind in self._kinds and (p.phase != "cleared" or p.frozen)]
         if not near:
             return ()
         nearest = min(near, key=lambda p: (p.statistic - p.threshold, p.subject))
-        return self._do.proposals(f"{nearest.subject or 'a human'} nearer than the protective separation distance")
+        return self._do.proposals(f"{nearest.kind} of {nearest.subject or 'a human'}")

@@ -37,12 +37,7 @@ class Campaign(msgspec.Struct, frozen=True):
     plan: Plan
 
     def rows(self) -> list[Row]:
-        """What was run, in the plan's order."""
-        with Ledger(self.folder) as ledger:
-            return ledger.rows(self.plan.cases)
-
-    def recorded(self) -> list[Row]:
-        """What was run last of each run, whatever has changed since then."""
+        """What was run, in the plan's order, whatever has changed since then."""
         with Ledger(self.folder) as ledger:
             return ledger.recorded(ledger.meta("keys", list[str]))
 
@@ -141,6 +136,7 @@ class _Feed:
         self._estimated, self._told = estimated, told
         self._cases = {c.key: c for c in campaign.plan.cases}
         self._status = {k: s for k, s in ledger.statuses().items() if k in self._cases}
+        self._failed = sum(s != "ok" for s in self._status.values())
         self._scripted: dict[str, tuple[Intervention, ...]] = {}
         self._configs: dict[tuple[str, str], str] = {}
         self._waiting: dict[str, list[Case]] = {}
@@ -225,6 +221,7 @@ class _Feed:
         row = row_of(case, result, wall_s, self._scripted.pop(key, ()))
         self._ledger.put(row, result.interventions if isinstance(result, Run) else ())
         self._status[key] = row.status
+        self._failed += not row.ok
         self._new += 1
         self._ready.extendleft(reversed(self._waiting.pop(key, [])))
         if key in self._pilots:
@@ -240,8 +237,7 @@ class _Feed:
     def progress(self) -> Progress:
         """How far it is."""
         elapsed_s = seconds(monotonic_ns() - self._begin_ns)
-        failed = sum(s != "ok" for s in self._status.values())
-        return Progress(len(self._status), len(self._cases), failed, self._new / elapsed_s if elapsed_s else 0.0)
+        return Progress(len(self._status), len(self._cases), self._failed, self._new / elapsed_s if elapsed_s else 0.0)
 
     def left(self) -> list[Case]:
         """Runs that are not done."""

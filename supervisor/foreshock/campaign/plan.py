@@ -151,6 +151,7 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
         "scenarios": {id_: _content(s) for id_, s in scenarios.items()},
         "twins": files,
         "code": code,
+        "plugins": sorted(plugins),
     }
     # as it will be read from the ledger: lists, not tuples
     return Plan(spec, scenarios, msgspec.json.decode(msgspec.json.encode(identity)), tuple(cases))

@@ -15,6 +15,7 @@ from rich.progress import Progress as Bar
 
 from foreshock.campaign.again import Again, case_of
 from foreshock.campaign.again import rerun as rerun_case
+from foreshock.campaign.cluster import dask_runner
 from foreshock.campaign.compare import compare as compare_campaigns
 from foreshock.campaign.engine import Campaign, Estimate, Progress, begin, execute, refuse_changes, reopen
 from foreshock.campaign.ledger import Row
@@ -27,7 +28,7 @@ from foreshock.cli.output import FAILED, NEGATIVE, OK, console, emit, notes, tab
 from foreshock.cli.simulate_cmd import summary, timeline
 from foreshock.errors import BadInputError, MissingExtraError
 from foreshock.registry import Registry
-from foreshock.session.isolated import Failure
+from foreshock.session.isolated import Failure, run_stream
 from foreshock.session.run import Run
 
 __all__ = ["campaign"]
@@ -36,6 +37,7 @@ folder_argument = click.argument("folder", type=click.Path(path_type=Path, file_
 workers_option = click.option(
     "--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes."
 )
+dask_option = click.option("--dask", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler instead.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 
 
@@ -65,14 +67,15 @@ def schema() -> None:
 @click.argument("spec")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of the campaign.")
 @workers_option
+@dask_option
 @json_option
-def run(spec: str, out: Path, workers: int, as_json: bool) -> int:
+def run(spec: str, out: Path, workers: int, dask: str | None, as_json: bool) -> int:
     """Begin a campaign: SPEC is a TOML file, or the id of one that comes with Foreshock.
 
     Exit code 3 if a run gave no result; the others are not affected.
     """
     parsed, origin = load_campaign(spec)
-    return _go(begin(parsed, origin, out, Registry()), workers, as_json)
+    return _go(begin(parsed, origin, out, Registry()), workers, dask, as_json)
 
 
 @campaign.command()
@@ -80,13 +83,14 @@ def run(spec: str, out: Path, workers: int, as_json: bool) -> int:
 @click.option("--accept", is_flag=True, help="Go on although something has changed; what depends on it is run again.")
 @click.option("--retry", is_flag=True, help="Do runs again that gave no result.")
 @workers_option
+@dask_option
 @json_option
-def resume(folder: Path, accept: bool, retry: bool, workers: int, as_json: bool) -> int:
+def resume(folder: Path, accept: bool, retry: bool, workers: int, dask: str | None, as_json: bool) -> int:
     """Go on with a campaign that was broken off; the result is the same as without the break."""
     found, changed = reopen(folder, Registry(), accept=accept)
     if not accept:
         refuse_changes(folder, changed)
-    return _go(found, workers, as_json, retry=retry)
+    return _go(found, workers, dask, as_json, retry=retry)
 
 
 @campaign.command()
@@ -135,7 +139,7 @@ def compare(first: Path, second: Path, as_json: bool) -> int:
     """
     registry = Registry()
     sides = [reopen(folder, registry)[0] for folder in (first, second)]
-    changes = compare_campaigns(*((c.plan, c.recorded()) for c in sides))
+    changes = compare_campaigns(*((c.plan, c.rows()) for c in sides))
     if as_json:
         emit([{**msgspec.to_builtins(c), "worse": c.worse} for c in changes])
     elif changes:
@@ -200,10 +204,11 @@ def _print_again(again: Again, changed: list[str]) -> None:
         console.print(f"differs: {name} was {before}, is {now}", markup=False, style="red")
 
 
-def _go(found: Campaign, workers: int, as_json: bool, *, retry: bool = False) -> int:
+def _go(found: Campaign, workers: int, dask: str | None, as_json: bool, *, retry: bool = False) -> int:
+    runner = run_stream if dask is None else dask_runner(dask, found.plan)
     total = len(found.plan.cases)
     with _bar(total, as_json) as (estimated, told):
-        complete = execute(found, workers, estimated=estimated, told=told, retry=retry)
+        complete = execute(found, workers, runner=runner, estimated=estimated, told=told, retry=retry)
     rows = found.rows()
     state = _state(found, rows, [])
     results: list[ArmResult] = []

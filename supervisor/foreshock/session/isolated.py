@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures import TimeoutError as FutureTimeout
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -36,7 +36,7 @@ from foreshock.session.simulate import simulate
 from foreshock.supervisor import Supervisor
 from foreshock.twin import Twin
 
-__all__ = ["Failure", "Job", "Source", "build_twin", "placed", "run_all", "run_one", "run_stream"]
+__all__ = ["Failure", "Job", "Source", "Workers", "build_twin", "placed", "run_all", "run_one", "run_stream"]
 
 K = TypeVar("K", bound=Hashable)
 
@@ -237,10 +237,45 @@ class Source(Protocol[K]):
         """A result, as soon as it is there; its wall time is NaN where it failed."""
 
 
+class Workers:
+    """Watched worker processes that stay until they are closed: jobs in, results out, from any thread.
+
+    Args:
+        count: number of processes.
+        scratch: a folder for what is temporary; its owner removes it.
+    """
+
+    def __init__(self, count: int, scratch: Path) -> None:
+        self._scratch = scratch
+        self._pool = ProcessPool(
+            max_workers=count, context=get_context("spawn"), initializer=_quiet, initargs=[str(scratch)]
+        )
+
+    def begin(self, job: Job, timeout_s: float | None = None) -> Any:
+        """A future of the job, for result."""
+        return self._pool.schedule(_timed, args=[job, str(self._scratch)], timeout=_limit_s(job, timeout_s))
+
+    def result(self, job: Job, future: Any, timeout_s: float | None = None) -> tuple[Run | Failure, float]:
+        """Wait for a result; with its wall time in s, which is NaN where it failed.
+
+        Unlike run_all, a job that names something which does not exist fails alone, as ``bad-input``.
+        """
+        try:
+            found = _result(job, future, _limit_s(job, timeout_s), self._scratch)
+        except BadInputError as e:
+            found = Failure(job, "bad-input", str(e))
+        except ForeshockError as e:
+            found = Failure(job, "error", f"{type(e).__name__}: {e}")
+        return found if isinstance(found, tuple) else (found, math.nan)
+
+    def close(self) -> None:
+        """End the processes, and what they do."""
+        self._pool.stop()  # type: ignore[no-untyped-call]  # pebble has no types
+        self._pool.join()
+
+
 def run_stream(source: Source[K], workers: int = 1, timeout_s: float | None = None, folder: Path | None = None) -> None:
     """Do jobs until there is none left and none runs; results in the order in which they come.
-
-    Unlike run_all, a job that names something which does not exist fails alone, as ``bad-input``.
 
     Args:
         source: gives jobs and takes results.
@@ -248,28 +283,17 @@ def run_stream(source: Source[K], workers: int = 1, timeout_s: float | None = No
         timeout_s: as in run_all.
         folder: where the scratch folder is made; the system's place for temporary files by default.
     """
-    with _scratch(folder) as scratch, _pool(workers, scratch) as pool:
-        running: dict[Any, tuple[K, Job, float]] = {}
+    with _scratch(folder) as scratch, closing(Workers(workers, scratch)) as pool:
+        running: dict[Any, tuple[K, Job]] = {}
         while True:
             # one more than there are workers: none waits for this process to write its result down
             while len(running) <= workers and (given := source.next()) is not None:
-                key, job = given
-                limit = _limit_s(job, timeout_s)
-                running[pool.schedule(_timed, args=[job, str(scratch)], timeout=limit)] = key, job, limit
+                running[pool.begin(given[1], timeout_s)] = given
             if not running:
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:
-                key, job, limit = running.pop(future)
-                try:
-                    result = _result(job, future, limit, scratch)
-                except BadInputError as e:
-                    result = Failure(job, "bad-input", str(e))
-                except ForeshockError as e:
-                    result = Failure(job, "error", f"{type(e).__name__}: {e}")
-                if isinstance(result, tuple):
-                    source.done(key, *result)
-                else:
-                    source.done(key, result, math.nan)
+                key, job = running.pop(future)
+                source.done(key, *pool.result(job, future, timeout_s))
 
 
 def _result(job: Job, future: Any, timeout_s: float, scratch: Path) -> Any:
