@@ -66,7 +66,7 @@ def write_page(path: Path, campaign: Campaign, rows: Sequence[Row], results: Seq
             failures=[r for r in rows if not r.ok],
             identity=campaign.plan.identity,
             main=shown(results),
-            parts=[r for r in results if r.scope.kind not in ("overall", "mode")],
+            parts=[r for r in results if r.scope.kind in ("scenario", "factor")],
             rates=_rates(shown(results), colours, rows),
             leads=_leads(campaign, rows, colours),
             maps=_maps(rows),
@@ -82,7 +82,7 @@ def _groups(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def _rates(results: Sequence[ArmResult], colours: dict[str, str], rows: Sequence[Row]) -> dict[str, Any]:
-    """Accident rates with their intervals: one line per arm, in blocks for the whole and each mode."""
+    """Accident rates with their intervals: one line per arm, in blocks for the whole, each mode and each fault."""
     first = {r.mode: r.scenario for r in reversed(rows)}
     labels: list[tuple[float, str, str]] = []
     dots: list[_Dot] = []
@@ -95,7 +95,7 @@ def _rates(results: Sequence[ArmResult], colours: dict[str, str], rows: Sequence
         labels.append((y, r.arm, name if r.scope != before else ""))
         before = r.scope
         share = r.accidents.k / r.accidents.n
-        target = f"s-{first[r.scope.name]}" if r.scope.name else "runs"
+        target = f"s-{first[r.scope.name]}" if r.scope.kind == "mode" else "runs"
         dots.append(
             _Dot(share, y, colours[r.arm], target, f"{name}, {r.arm}: {r.accidents}", r.accidents.low, r.accidents.high)
         )

@@ -192,11 +192,9 @@ def _brier(rows: Iterable[Row]) -> Brier | None:
 
 
 def shown(results: Sequence[ArmResult]) -> list[ArmResult]:
-    """Those of the whole and of each mode; of the mode alone where there is only one."""
-    modes = [r for r in results if r.scope.kind == "mode"]
-    if len({r.scope for r in modes}) == 1:
-        return modes
-    return [r for r in results if r.scope.kind in ("overall", "mode")]
+    """Those of the whole, of each mode and of each fault; the whole is left out where there is only one mode."""
+    several = len({r.scope for r in results if r.scope.kind == "mode"}) > 1
+    return [r for r in results if r.scope.kind in ("mode", "fault") or (several and r.scope.kind == "overall")]
 
 
 def frequency(found: Frequency | None) -> str:

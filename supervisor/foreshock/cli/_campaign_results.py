@@ -32,10 +32,10 @@ def print_results(spec: CampaignSpec, results: Sequence[ArmResult]) -> None:
         "failures": ("no result",),
     }
     wanted = [c for metric in spec.metrics for c in columns[metric]]
-    rows = []
-    for r in shown(results):
-        cells = _cells(r)
-        rows.append((r.scope.name or "overall", r.arm, *(cells[c] for c in wanted)))
+    printed = [(r, _cells(r)) for r in shown(results)]
+    # a column that says nothing takes the room of one that does
+    wanted = [c for c in wanted if any(cells[c] not in ("–", "0") for _, cells in printed)]
+    rows = [(r.scope.name or "overall", r.arm, *(cells[c] for c in wanted)) for r, cells in printed]
     reference = spec.reference_arm
     against = f", paired with {reference.id}" if reference is not None else ""
     table(f"{spec.id}: 95% intervals{against}", "part", "arm", *wanted, rows=rows, right=tuple(wanted))
@@ -48,7 +48,7 @@ def _cells(r: ArmResult) -> Mapping[str, str]:
         "accidents": str(r.accidents),
         "difference": f"{100 * d.difference:+.0f} ({100 * d.low:+.0f}..{100 * d.high:+.0f})" if d and told else "–",
         "p": f"{d.p:.2g}" if d and told else "–",
-        "prevented": str(r.prevented) if d is not None else "–",
+        "prevented": f"{r.prevented.k}/{r.prevented.n}" if d is not None else "–",
         "caused": str(r.caused) if d is not None else "–",
         "lead (s)": f"{lead[1]:.2f}" if lead is not None else "–",
         "false per hour": frequency(r.false),
