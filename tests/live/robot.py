@@ -94,6 +94,7 @@ class Robot:
         self.interventions: list[Intervention] = []
         self.stops: list[str] = []
         self.streaming = True
+        self.jump_ns = 0
         self.guard = Guard("robot", self._take, self.stops.append, self.link, "g1")
         self._ended = threading.Event()
         self._codec, self._sequence = Codec(), 0
@@ -143,5 +144,5 @@ class Robot:
         grip = GripState(True, 20.0, 5.0, 0.05, 20.0, 0.5, 0.0)
         while not self._ended.wait(0.01):
             if self.streaming:
-                stamp_ns = time.time_ns()
+                stamp_ns = time.time_ns() + self.jump_ns
                 self.put(self._codec.encode(grip, stamp_ns), self.attachment(stamp_ns))

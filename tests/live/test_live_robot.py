@@ -114,3 +114,17 @@ def test_a_dead_or_stopped_supervisor_ends_motion_and_another_one_resumes(tmp_pa
             until(robot.guard.permitted, "the robot may move under the next supervisor")
             status = until(robot.status, "its status")
             assert status.motion_permitted
+
+
+def test_a_clock_that_jumps_ends_motion_until_it_is_steady_again(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        time.sleep(2.5)  # in its first 2 s a clock is believed whatever it does
+        robot.jump_ns = 10_000_000_000
+        until(lambda: not robot.guard.permitted(), "nobody moves on a clock that has jumped")
+        status = until(lambda: (s := robot.status()) and s.withheld and s, "the status says why")
+        assert status.withheld == "the clock of robot/left_gripper/state has jumped"
+        until(lambda: (s := robot.status()) and not s.withheld, "it has been steady for 2 s, and is believed again")
+        status = until(robot.status, "status")
+        assert status.streams["robot/left_gripper/state"].counts.jumps == 1

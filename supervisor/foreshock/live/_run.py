@@ -143,7 +143,7 @@ class LiveSupervisor:
         self._robot.tell(decision, now_ns)
         self._decision = decision
         self._handshakes.update(self._services.peers(), now_ns)
-        permitted = not self._robot.overdue(now_ns) and not self._handshakes.refused
+        permitted = not (self._robot.overdue(now_ns) or self._handshakes.refused or self._doubted())
         self._robot.grant(self.supervisor, now_ns, permitted=permitted)
         verdicts = self.supervisor.verdicts_of(decision)
         self._digest.tick(samples, decision, verdicts)
@@ -157,6 +157,10 @@ class LiveSupervisor:
         self._publish(decision, now_ns)
         self._answer()
         return decision
+
+    def _doubted(self) -> list[str]:
+        """Streams whose clock has just jumped: nobody moves on them, however old their last believed sample may be."""
+        return [s.channel for s in self._streams if s.doubted and (s.channel in self._needed or not self._needed)]
 
     def _silent(self) -> list[str]:
         """Streams that have not begun, of those that are needed; where none is, all of them until any has."""
@@ -173,6 +177,8 @@ class LiveSupervisor:
         now_ns, d = monotonic_ns(), self._decision
         overdue = self._robot.overdue(now_ns)
         withheld = f"no guard has acknowledged {', '.join(overdue)}" if overdue else ""
+        if doubted := self._doubted():
+            withheld = f"the clock of {', '.join(doubted)} has jumped"
         if refused := self._handshakes.refused:
             withheld = "; ".join(f"{twin} is refused: {why}" for twin, why in refused.items())
         if self._missing:

@@ -56,6 +56,9 @@ class Stream:
         cls: message class that it must carry.
         codec: that knows the layouts.
         max_skew_s: see ClockOffset.
+
+    Attributes:
+        doubted: the source's clock has just jumped, and is not believed yet.
     """
 
     def __init__(self, session: Any, keys: Keys, channel: str, cls: type, codec: Codec, max_skew_s: float) -> None:
@@ -66,6 +69,7 @@ class Stream:
         self._subscriber = session.declare_subscriber(self.key, zenoh.handlers.RingChannel(RING))
         self.counts = StreamCounts()
         self.offset_ns: int | None = None
+        self.doubted = False
         self.newest_ns = -1
         self.arrived_ns = -1
         self._clock = ClockOffset(max_skew_s)
@@ -122,6 +126,7 @@ class Stream:
         self._sequence, self._stamp_ns = max(sequence, self._sequence), max(stamp_ns, self._stamp_ns)
         at_ns = self._clock.take(stamp_ns, arrival_ns)
         counts.jumps, self.offset_ns = self._clock.jumps, self._clock.offset_ns
+        self.doubted = at_ns is None
         if at_ns is None:
             counts.unbelieved += 1
             counts.last_fault = f"a stamp that its clock's offset does not explain by more than {self._skew_s:g} s"
