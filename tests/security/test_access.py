@@ -85,9 +85,8 @@ def stream(session: Any, k: int) -> None:
 
 
 def samples(plant: Plant, session: Any) -> int:
-    status = plant.status(session)
-    assert status is not None
-    return status.streams["robot/left_gripper/state"].counts.samples
+    status = until(lambda: plant.status(session), "a status")
+    return int(status.streams["robot/left_gripper/state"].counts.samples)
 
 
 def test_only_the_robot_writes_its_streams(plant: Plant) -> None:
@@ -149,7 +148,7 @@ def test_a_foreign_authority_and_no_certificate_are_refused(plant: Plant, tmp_pa
     plain = LinkSettings("client", (), (plant.endpoint.replace("tls/", "tcp/"),))
     assert _opened(plain) is None
     with plant.open("viewer") as viewer:
-        assert plant.status(viewer) is not None
+        until(lambda: plant.status(viewer), "who shows the right certificate is answered")
 
 
 def test_a_request_for_a_lease_needs_the_robots_certificate(plant: Plant) -> None:
