@@ -16,7 +16,7 @@ import msgspec
 
 from foreshock.cli.output import NEGATIVE, OK, emit, table
 from foreshock.cli.top_cmd import ask
-from foreshock.clock import monotonic_ns, sleep_until
+from foreshock.clock import NS_PER_S, monotonic_ns, sleep_until, wall_ns
 from foreshock.errors import ForeshockError
 from foreshock.link import LinkSettings, keys_of, open_link
 from foreshock.live import RunConfig, Status, load_run
@@ -137,7 +137,7 @@ def _certificates(link: LinkSettings, base: Path) -> Iterator[Finding]:
         except ValueError as e:
             yield Finding(what, False, f"{path}: {e}")
             continue
-        left = (certificate.not_valid_after_utc.timestamp() - time.time()) / 86400.0
+        left = (certificate.not_valid_after_utc.timestamp() - wall_ns() / NS_PER_S) / 86400.0
         yield Finding(what, left > 0.0, f"{certificate.subject.rfc4514_string()}, valid for {left:.0f} days")
 
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import msgspec
-from pebble import ProcessPool
 
 from foreshock.clock import seconds
 from foreshock.errors import TwinError
 from foreshock.events._stretches import Stretches
 from foreshock.events.schema import EventPrecursor
 from foreshock.registry import Registry
-from foreshock.session.isolated import Failure, Job, _quiet, _result, _scratch, build_twin
+from foreshock.session.isolated import Failure, Job, _limit_s, _pool, _result, _scratch, build_twin
 from foreshock.session.run import Run
 from foreshock.session.simulate import simulate
 from foreshock.supervisor import Supervisor
@@ -74,23 +72,15 @@ def observe_all(
         BadInputError: a job names something that does not exist: every job of its kind would fail.
     """
     results: list[Observed | Failure] = []
-    with _scratch() as scratch:
-        pool = ProcessPool(
-            max_workers=workers, context=get_context("spawn"), initializer=_quiet, initargs=[str(scratch)]
-        )
-        try:
-            limits = [60.0 + 10.0 * job.scenario.duration_s if timeout_s is None else timeout_s for job in jobs]
-            futures = [
-                pool.schedule(_observe, args=[job, str(scratch)], timeout=limit)
-                for job, limit in zip(jobs, limits, strict=True)
-            ]
-            for k, (job, future, limit) in enumerate(zip(jobs, futures, limits, strict=True)):
-                result = cast("Observed | Failure", _result(job, future, limit, scratch))
-                results.append(result)
-                if done is not None:
-                    done(k, result if isinstance(result, Failure) else result.run)
-            pool.close()  # type: ignore[no-untyped-call]  # pebble has no types
-        finally:
-            pool.stop()  # type: ignore[no-untyped-call]  # as above
-            pool.join()
+    with _scratch() as scratch, _pool(workers, scratch) as pool:
+        limits = [_limit_s(job, timeout_s) for job in jobs]
+        futures = [
+            pool.schedule(_observe, args=[job, str(scratch)], timeout=limit)
+            for job, limit in zip(jobs, limits, strict=True)
+        ]
+        for k, (job, future, limit) in enumerate(zip(jobs, futures, limits, strict=True)):
+            result = cast("Observed | Failure", _result(job, future, limit, scratch))
+            results.append(result)
+            if done is not None:
+                done(k, result if isinstance(result, Failure) else result.run)
     return results

@@ -7,17 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from foreshock.clock import NS_PER_S
 from foreshock.records import Decision, Intervention
-from foreshock.wire import encode_ros, ros_type
+from foreshock.wire import encode_ros, ros_header, ros_type
 
 __all__ = ["decision_bytes"]
-
-
-def _header(stamp_ns: int) -> Any:
-    sec, nanosec = divmod(stamp_ns, NS_PER_S)
-    time = ros_type("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
-    return ros_type("std_msgs/msg/Header")(stamp=time, frame_id="")
 
 
 def decision_bytes(d: Decision, epoch: int, digest: str) -> bytes:
@@ -25,7 +18,7 @@ def decision_bytes(d: Decision, epoch: int, digest: str) -> bytes:
     modes = sorted(d.levels)
     precursor, intervention = ros_type("foreshock_msgs/msg/Precursor"), ros_type("foreshock_msgs/msg/Intervention")
     message = ros_type("foreshock_msgs/msg/Decision")(
-        header=_header(d.now_ns),
+        header=ros_header(d.now_ns),
         epoch=epoch,
         tick=d.tick,
         level=int(d.level),
@@ -68,7 +61,7 @@ def decision_bytes(d: Decision, epoch: int, digest: str) -> bytes:
 
 def _intervention(cls: Any, i: Intervention, epoch: int) -> Any:
     return cls(
-        header=_header(i.stamp_ns),
+        header=ros_header(i.stamp_ns),
         epoch=epoch,
         number=0,
         action=i.action,

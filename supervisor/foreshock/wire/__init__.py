@@ -14,7 +14,7 @@ from foreshock.wire._lockstep import (
     pack_samples,
     unpack_samples,
 )
-from foreshock.wire._ros import BY_ROS, ROS_NAMES, stamp_of
+from foreshock.wire._ros import BY_ROS, ROS_NAMES, ros_header, stamp_of
 from foreshock.wire._ros import from_ros as message_of
 from foreshock.wire._types import definitions, rihs01, ros_type, typestore
 
@@ -44,6 +44,7 @@ __all__ = [
     "pack_attachment",
     "pack_samples",
     "rihs01",
+    "ros_header",
     "ros_type",
     "stamp_of",
     "typestore",

@@ -33,13 +33,14 @@ from foreshock.messages import (
 )
 from foreshock.wire._types import ros_type
 
-__all__ = ["BY_ROS", "ROS_NAMES", "from_ros", "stamp_of", "to_ros"]
+__all__ = ["BY_ROS", "ROS_NAMES", "from_ros", "ros_header", "stamp_of", "to_ros"]
 
 VISIBLE = "visible"
 """The class of a second hypothesis that carries a detection's visible share; vision_msgs has no field for it."""
 
 
-def _header(stamp_ns: int, frame_id: str = "") -> Any:
+def ros_header(stamp_ns: int, frame_id: str = "") -> Any:
+    """A std_msgs/Header."""
     sec, nanosec = divmod(stamp_ns, NS_PER_S)
     time = ros_type("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     return ros_type("std_msgs/msg/Header")(stamp=time, frame_id=frame_id)
@@ -75,7 +76,7 @@ def _pose(position: Sequence[float], orientation: Sequence[float]) -> Any:
 
 def _joint_state(m: JointState, stamp_ns: int) -> Any:
     return ros_type("sensor_msgs/msg/JointState")(
-        header=_header(stamp_ns),
+        header=ros_header(stamp_ns),
         name=list(m.name),
         position=_array(m.position),
         velocity=_array(m.velocity),
@@ -86,7 +87,7 @@ def _joint_state(m: JointState, stamp_ns: int) -> Any:
 def _imu(m: Imu, stamp_ns: int) -> Any:
     unknown = np.zeros(9)
     return ros_type("sensor_msgs/msg/Imu")(
-        header=_header(stamp_ns, m.frame_id),
+        header=ros_header(stamp_ns, m.frame_id),
         orientation=_quaternion(m.orientation),
         orientation_covariance=unknown,
         angular_velocity=_vector(m.angular_velocity),
@@ -98,14 +99,14 @@ def _imu(m: Imu, stamp_ns: int) -> Any:
 
 def _wrench(m: WrenchStamped, stamp_ns: int) -> Any:
     wrench = ros_type("geometry_msgs/msg/Wrench")(force=_vector(m.force), torque=_vector(m.torque))
-    return ros_type("geometry_msgs/msg/WrenchStamped")(header=_header(stamp_ns, m.frame_id), wrench=wrench)
+    return ros_type("geometry_msgs/msg/WrenchStamped")(header=ros_header(stamp_ns, m.frame_id), wrench=wrench)
 
 
 def _odometry(m: Odometry, stamp_ns: int) -> Any:
     unknown = np.zeros(36)
     twist = ros_type("geometry_msgs/msg/Twist")(linear=_vector(m.linear), angular=_vector(m.angular))
     return ros_type("nav_msgs/msg/Odometry")(
-        header=_header(stamp_ns, m.frame_id),
+        header=ros_header(stamp_ns, m.frame_id),
         child_frame_id=m.child_frame_id,
         pose=ros_type("geometry_msgs/msg/PoseWithCovariance")(
             pose=_pose(m.position, m.orientation), covariance=unknown
@@ -116,7 +117,7 @@ def _odometry(m: Odometry, stamp_ns: int) -> Any:
 
 def _detections(m: Detections, stamp_ns: int) -> Any:
     upright = (0.0, 0.0, 0.0, 1.0)
-    header = _header(stamp_ns, m.frame_id)
+    header = ros_header(stamp_ns, m.frame_id)
     rows = []
     for d in m.detections:
         pose = ros_type("geometry_msgs/msg/PoseWithCovariance")(pose=_pose(d.center, upright), covariance=np.zeros(36))
@@ -152,7 +153,7 @@ def _humans(m: Humans, stamp_ns: int) -> Any:
         )
         for h in m.humans
     ]
-    return ros_type("foreshock_msgs/msg/Humans")(header=_header(stamp_ns, m.frame_id), humans=rows)
+    return ros_type("foreshock_msgs/msg/Humans")(header=ros_header(stamp_ns, m.frame_id), humans=rows)
 
 
 def _human(h: Any) -> HumanPose:
@@ -165,7 +166,7 @@ def _plain(cls: type[msgspec.Struct], ros: str) -> Callable[[Any, int], Any]:
     names = [f for f in cls.__struct_fields__ if f != "frame_id"]
 
     def convert(m: Any, stamp_ns: int) -> Any:
-        header = _header(stamp_ns, getattr(m, "frame_id", ""))
+        header = ros_header(stamp_ns, getattr(m, "frame_id", ""))
         return ros_type(ros)(header=header, **{n: getattr(m, n) for n in names})
 
     return convert
@@ -173,19 +174,19 @@ def _plain(cls: type[msgspec.Struct], ros: str) -> Callable[[Any, int], Any]:
 
 def _path(m: PlannedPath, stamp_ns: int) -> Any:
     return ros_type("foreshock_msgs/msg/PlannedPath")(
-        header=_header(stamp_ns, m.frame_id), x=_array(m.x), y=_array(m.y), time_from_start=_array(m.time_from_start)
+        header=ros_header(stamp_ns, m.frame_id), x=_array(m.x), y=_array(m.y), time_from_start=_array(m.time_from_start)
     )
 
 
 def _plan(m: MotionPlan, stamp_ns: int) -> Any:
     return ros_type("foreshock_msgs/msg/MotionPlan")(
-        header=_header(stamp_ns), com=_point(m.com), support=list(m.support), speed=m.speed
+        header=ros_header(stamp_ns), com=_point(m.com), support=list(m.support), speed=m.speed
     )
 
 
 def _gaze(m: Gaze, stamp_ns: int) -> Any:
     return ros_type("foreshock_msgs/msg/Gaze")(
-        header=_header(stamp_ns, m.frame_id),
+        header=ros_header(stamp_ns, m.frame_id),
         human_id=m.human_id,
         direction=_vector(m.direction),
         confidence=m.confidence,
