@@ -1,4 +1,4 @@
-"""No sensor of a ready plant repeats itself where a detector takes that for frozen: not in one pair of samples."""
+"""No sensor of a ready plant comes near the standstill that a detector takes for frozen."""
 
 from __future__ import annotations
 
@@ -21,33 +21,33 @@ REGISTRY = Registry()
 SCENARIOS = scenario_ids(REGISTRY)
 
 
-class Repeats:
-    """A journal that keeps how often each channel repeated its values."""
+class Standstills:
+    """A journal that keeps the longest standstill of each channel (s)."""
 
     def __init__(self) -> None:
-        self.last: dict[str, Sample] = {}
-        self.count: dict[str, int] = {}
+        self.moved: dict[str, Sample] = {}
+        self.longest_s: dict[str, float] = {}
 
     def tick(self, samples: Any, decision: object, verdicts: object) -> None:
         for s in samples:
-            before = self.last.get(s.channel)
-            self.count[s.channel] = self.count.get(s.channel, 0) + (
-                before is not None and stands_still(before.value, s.value)
-            )
-            self.last[s.channel] = s
+            moved = self.moved.get(s.channel)
+            if moved is None or not stands_still(moved.value, s.value):
+                self.moved[s.channel] = moved = s
+            still_s = (s.stamp_ns - moved.stamp_ns) / 1e9
+            self.longest_s[s.channel] = max(still_s, self.longest_s.get(s.channel, 0.0))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", builtin_taxonomy().codes)
-def test_what_a_detector_calls_frozen_never_stands_still_in_a_ready_scenario(mode: str, tmp_path: Path) -> None:
+def test_no_ready_scenario_stands_still_for_a_quarter_of_what_is_allowed(mode: str, tmp_path: Path) -> None:
     for id_, scenario in SCENARIOS.items():
         if scenario.mode != mode:
             continue
         twin = build_twin(scenario, REGISTRY, tmp_path / id_)
         judge = Supervisor(scenario.supervisor(), Path(scenario.folder), REGISTRY)
-        watched = {i.channel for i in judge.inputs() if i.max_standstill_s > 0.0}
+        watched = [i for i in judge.inputs() if i.max_standstill_s > 0.0]
         assert watched, f"{id_}: nothing is watched for standing still"
-        repeats = Repeats()
+        found = Standstills()
         simulate(
             msgspec.structs.replace(scenario, duration_s=min(scenario.duration_s, 12.0)),
             twin,
@@ -55,9 +55,14 @@ def test_what_a_detector_calls_frozen_never_stands_still_in_a_ready_scenario(mod
             "on",
             1,
             detail=False,
-            journals=[repeats],
+            journals=[found],
         )  # type: ignore[list-item]
         judge.close()
         twin.close()
-        assert watched <= repeats.count.keys(), f"{id_}: {sorted(watched - repeats.count.keys())} never came"
-        assert {c: repeats.count[c] for c in watched if repeats.count[c]} == {}, id_
+        assert {i.channel for i in watched} <= found.longest_s.keys(), id_
+        slow = {
+            i.channel: found.longest_s[i.channel]
+            for i in watched
+            if found.longest_s[i.channel] > i.max_standstill_s / 4
+        }
+        assert slow == {}, id_
