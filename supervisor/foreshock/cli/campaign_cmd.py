@@ -144,7 +144,7 @@ def compare(first: Path, second: Path, as_json: bool) -> int:
     """Hold campaign B against campaign A, run by run where they share runs.
 
     Exit code 1 if a result of B is significantly worse: more accidents or false interventions, less lead time, more
-    runs without a result.
+    time at reduced speed, more runs without a result.
     """
     registry = Registry()
     sides = [reopen(folder, registry)[0] for folder in (first, second)]
