@@ -69,7 +69,7 @@ def markdown(plan: Plan, total: tuple[int, int], standings: Sequence[Standing], 
     reference = spec.reference_arm
     lines = [
         f"Campaign `{spec.id}`, seeds from {spec.seed}: {total[0]} of {total[1]} runs gave a result. Reference: "
-        f"`{reference.id if reference else 'none'}`. Brackets are 95% intervals.",
+        f"{f'`{reference.id}`' if reference else 'no arm'}. Brackets are 95% intervals.",
         "",
         "First places by the figures alone, of arms that ran in all scenarios of the part; the last two columns are of "
         "arms that decide and act.",
