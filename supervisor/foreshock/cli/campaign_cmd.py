@@ -20,7 +20,7 @@ from foreshock.campaign.compare import compare as compare_campaigns
 from foreshock.campaign.engine import Campaign, Estimate, Progress, begin, execute, refuse_changes, reopen
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.plan import Case
-from foreshock.campaign.report import write_results
+from foreshock.campaign.report import ranking_of, write_results
 from foreshock.campaign.results import ArmResult
 from foreshock.campaign.spec import campaign_schema, load_campaign, shipped
 from foreshock.cli._campaign_results import print_changes, print_results, results_json
@@ -110,14 +110,23 @@ def status(folder: Path, as_json: bool) -> int:
 
 @campaign.command()
 @folder_argument
+@click.option(
+    "--markdown",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write which arm wins where, and where Foreshock loses, as Markdown.",
+)
 @json_option
-def report(folder: Path, as_json: bool) -> int:
-    """Write runs.parquet, results.parquet and report.html into DIR, and print the results.
+def report(folder: Path, markdown: Path | None, as_json: bool) -> int:
+    """Write report.html and the Parquet files into DIR, and print the results.
 
     Also of a campaign that is not complete.
     """
     found, _ = reopen(folder, Registry())
     results, paths = write_results(found)
+    if markdown is not None:
+        markdown.write_text(ranking_of(found, results))
+        paths.append(markdown)
     if as_json:
         emit({"results": results_json(results), "files": [str(p) for p in paths]})
         return OK
@@ -135,7 +144,7 @@ def compare(first: Path, second: Path, as_json: bool) -> int:
     """Hold campaign B against campaign A, run by run where they share runs.
 
     Exit code 1 if a result of B is significantly worse: more accidents or false interventions, less lead time, more
-    runs without a result.
+    time at reduced speed, more runs without a result.
     """
     registry = Registry()
     sides = [reopen(folder, registry)[0] for folder in (first, second)]

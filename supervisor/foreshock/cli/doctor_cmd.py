@@ -33,7 +33,7 @@ EXTRAS = {
     "zenoh": ("zenoh", "mcap", "rosbags"),
     "report": ("jinja2", "matplotlib"),
     "analysis": ("SALib", "sklearn", "statsmodels", "pyarrow"),
-    "campaign": ("jinja2", "matplotlib", "pyarrow", "scipy"),
+    "campaign": ("jinja2", "matplotlib", "pyarrow", "scipy", "sklearn"),
 }
 COMPILERS = ("cc", "gcc", "clang")
 

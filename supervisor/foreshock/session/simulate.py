@@ -76,7 +76,8 @@ def simulate(
     digest = DigestJournal()
     recorders = (digest, *journals) if detail else tuple(journals)
     tied = judge.taxonomy.kinds_of(scenario.mode) if judge is not None else frozenset()
-    log = _Log(scenario.mode, tied, detail)
+    caution = judge.config.gates.of_modes(judge.taxonomy)[scenario.mode].caution if judge is not None else 1.0
+    log = _Log(scenario.mode, tied, caution, detail)
     now, end, stop = 0, ns(scenario.duration_s), None
     told = 0
     ignored: set[str] = set()
@@ -86,6 +87,8 @@ def simulate(
             change = waiting.popleft()
             if change.action in twin.actions:
                 twin.intervene(change)
+            else:
+                ignored.add(change.action)
         samples = twin.advance(now)
         events = twin.events()
         decision = None
@@ -131,6 +134,7 @@ def simulate(
         log.max_level,
         warnings_of(judge, scenario.mode) if judge is not None else (),
         log.peak_p,
+        None if accidents else log.safe_s,
     )
 
 
@@ -156,8 +160,8 @@ def warnings_of(supervisor: Supervisor, mode: str | None = None) -> tuple[str, .
 class _Log:
     """Collects what a Run keeps."""
 
-    def __init__(self, mode: str, tied: frozenset[str], detail: bool) -> None:
-        self._mode, self._tied, self._detail = mode, tied, detail
+    def __init__(self, mode: str, tied: frozenset[str], caution: float, detail: bool) -> None:
+        self._mode, self._tied, self._caution, self._detail = mode, tied, caution, detail
         self._before: tuple[object, ...] = ()
         self._known: frozenset[str] = frozenset()
         self._events = 0
@@ -169,6 +173,8 @@ class _Log:
         self.series: dict[str, list[float]] = {}
         self.max_level = 0
         self.peak_p: float | None = None
+        self.safe_s: float | None = None
+        self._began = False
         self._over = False
 
     def tick(self, now_ns: int, decision: Decision | None, events: Sequence[TwinEvent], twin: Twin) -> None:
@@ -191,6 +197,11 @@ class _Log:
         self.health += d.health
         if not self._over:
             self.peak_p = max(self.peak_p or 0.0, d.risk.by_mode[mode])
+        if not (d.trust.control_by_mode[mode] >= self._caution):
+            self.safe_s = None
+        elif self.safe_s is None:
+            self.safe_s = t if self._began else 0.0
+        self._began = True
         level = d.level if d.level is ProtectionLevel.MINIMAL_RISK else d.levels[mode]
         self.max_level = max(self.max_level, level)
         for gate in (ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE):
