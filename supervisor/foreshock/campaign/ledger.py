@@ -178,10 +178,15 @@ class Ledger:
 
     def meta(self, name: str, to: type[T]) -> T:
         """A fact about the campaign."""
-        found = self._db.execute("select value from meta where name = ?", (name,)).fetchone()
+        found = self.known(name, to)
         if found is None:
             raise ConfigError(LEDGER, f"{name} is missing: the campaign was never begun")
-        return msgspec.json.decode(found[0], type=to)
+        return found
+
+    def known(self, name: str, to: type[T]) -> T | None:
+        """A fact, or None if it was never kept."""
+        found = self._db.execute("select value from meta where name = ?", (name,)).fetchone()
+        return None if found is None else msgspec.json.decode(found[0], type=to)
 
     def put(self, row: Row, changes: tuple[Intervention, ...] = ()) -> None:
         """Keep a result, and the interventions of the run for those that take them."""
