@@ -143,9 +143,6 @@ class Ledger:
 
     def __init__(self, folder: Path, *, new: bool = False) -> None:
         path = folder / LEDGER
-        if new and path.exists():
-            hint = f"; continue it with: foreshock campaign resume {folder}"
-            raise ConfigError(str(folder), "holds a campaign already", hint)
         if not new and not path.exists():
             raise ConfigError(str(folder), f"holds no campaign: there is no {LEDGER}")
         folder.mkdir(parents=True, exist_ok=True)
@@ -157,6 +154,11 @@ class Ledger:
         except sqlite3.DatabaseError as e:
             self._db.close()
             raise BadInputError(str(path), f"is no ledger: {e}") from None
+        # one that was killed before it kept anything is no campaign yet
+        if new and self._db.execute("select 1 from meta limit 1").fetchone():
+            self._db.close()
+            hint = f"; continue it with: foreshock campaign resume {folder}"
+            raise ConfigError(str(folder), "holds a campaign already", hint)
 
     def __enter__(self) -> Ledger:
         return self
