@@ -29,7 +29,7 @@ from tests.bench.rows import Row
 
 __all__ = ["rows"]
 
-RUNS, DURATION_S = 2000, 0.5
+RUNS, DURATION_S = 2000, 0.25
 ROUNDS = 3
 PARTS: tuple[tuple[str, type, str], ...] = (
     ("plant", FmuTwin, "reset"),
@@ -142,7 +142,7 @@ def rows() -> list[Row]:
     named = ", ".join(f"{name} {ms:.2f}" for name, ms in parts.items())
     share = other / whole
     paces: list[tuple[float, float, float]] = []
-    some = max(RUNS // 5, 40)
+    some = max(RUNS // 10, 40)
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         for _ in range(ROUNDS):
             one, two = (pace_hz(some, n, lambda _: run_stream) for n in (1, 2))

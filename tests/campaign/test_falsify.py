@@ -161,6 +161,9 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
     (tmp_path / "rogue.toml").write_text(SCENARIO)
     search = Search(str(tmp_path / "rogue.toml"), {"behaviour": (5.0, 5.9)}, "always(count <= 1)", runs=3, seeds=3)
     falsify(search, tmp_path / "out", Registry(), 1)
+    assert falsify(msgspec.structs.replace(search, runs=6), tmp_path / "out", Registry(), 1).known == 3
+    with pytest.raises(ConfigError, match=r"search\.seed was 0, is 1\ntake another folder"):
+        falsify(msgspec.structs.replace(search, seed=1), tmp_path / "out", Registry(), 1)
     (tmp_path / "rogue.toml").write_text(SCENARIO.replace("duration_s = 0.3", "duration_s = 0.4"))
     with pytest.raises(ConfigError, match=r"rogue\.duration_s was 0\.3, is 0\.4\ntake another folder"):
         falsify(search, tmp_path / "out", Registry(), 1)

@@ -49,7 +49,7 @@ class Search(msgspec.Struct, frozen=True):
         bounds: parameters that are searched, and between what; empty searches all that the scenario draws. Others are
             drawn anew by each seed, as ever.
         formula: what must hold; empty takes the scenario's own (``safe``).
-        runs: budget; a candidate costs 2 * FRESH more.
+        runs: budget; a candidate is still decided, which takes at most 2 * FRESH of them.
         seeds: runs per point.
         cases: it ends when so many are found; after each it begins anew.
         seed: of the search, and the first of the runs.
@@ -88,7 +88,7 @@ class Falsified(msgspec.Struct, frozen=True):
         unsupervised: the same without a supervisor.
         seed: a fresh one with the accident; the file's own.
         accident: what happened with it.
-        after_runs: runs of the search until then.
+        after_runs: runs until then, those on fresh seeds included.
     """
 
     file: str
@@ -108,8 +108,8 @@ class Found(msgspec.Struct, frozen=True):
         scenario: id.
         formula: what should hold.
         searched: support of each parameter: low and high, or the values of a choice.
-        runs: of the search.
-        known: of all runs those that the ledger had from before.
+        runs: that have ended.
+        known: of these, what the ledger had from before.
         failed: runs without a result, by status; they are no accident.
         best: the point with the least robustness.
         robustness: of that; None if no run gave a result.
@@ -173,10 +173,15 @@ def falsify(
     plan = plan_of(CampaignSpec("falsify", (ScenarioEntry(search.scenario),), arms), Path.cwd(), registry)
     source = _Source(search, plan, folder, told)
     with locked(folder), Ledger(folder, new=not (folder / LEDGER).exists()) as ledger, scratch_in(folder) as scratch:
+        # as it will be read from the ledger; a longer search goes on from a shorter one
+        settings = {
+            k: v for k, v in msgspec.json.decode(msgspec.json.encode(search)).items() if k not in ("runs", "cases")
+        }
+        now = {**plan.identity, "search": settings}
         before = ledger.known("falsify", dict[str, Any])
         if before is None:
-            ledger.put_meta(falsify=plan.identity)
-        refuse_changes(folder, changes(before or plan.identity, plan.identity), "\ntake another folder")
+            ledger.put_meta(falsify=now)
+        refuse_changes(folder, changes(before or now, now), "\ntake another folder")
         source.ledger = ledger
         run_stream(source, workers, timeout_s, scratch)
     return source.found
@@ -242,6 +247,7 @@ class _Source:
 
     def _take(self, key: str, outcome: _Outcome) -> None:
         self._outcomes[key] = outcome
+        self._note(runs=self.found.runs + 1)
         if outcome.status != "ok":
             self._failed[outcome.status] += 1
             self._note(failed=dict(self._failed))
@@ -274,7 +280,6 @@ class _Source:
         while (count := min(BATCH, (search.runs - self.found.runs) // search.seeds)) > 0:
             points = [optimiser.ask() for _ in range(count)]
             outcomes = yield [_Wanted(values, seed) for _, values in points for seed in seeds]
-            self._note(runs=self.found.runs + len(outcomes))
             before = len(self.found.cases)
             candidates: list[tuple[float, dict[str, float]]] = []
             for k, (trial, values) in enumerate(points):

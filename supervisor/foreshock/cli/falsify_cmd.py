@@ -95,7 +95,7 @@ def _bar(search: Search, quiet: bool) -> Iterator[Callable[[Found], None]]:
         BarColumn(None),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
-        TextColumn("least {task.fields[least]}, {task.fields[cases]} found, {task.fields[failed]} failed"),
+        TextColumn("left, least {task.fields[least]}, {task.fields[cases]} found, {task.fields[failed]} failed"),
         console=notes,
         transient=True,
         disable=quiet,
