@@ -166,9 +166,6 @@ class Ledger:
 
     def __init__(self, folder: Path, *, new: bool = False) -> None:
         path = folder / LEDGER
-        if new and path.exists():
-            hint = f"; continue it with: foreshock campaign resume {folder}"
-            raise ConfigError(str(folder), "holds a campaign already", hint)
         if not new and not path.exists():
             raise ConfigError(str(folder), f"holds no campaign: there is no {LEDGER}")
         folder.mkdir(parents=True, exist_ok=True)
@@ -180,6 +177,11 @@ class Ledger:
         except sqlite3.DatabaseError as e:
             self._db.close()
             raise BadInputError(str(path), f"is no ledger: {e}") from None
+        # one that was killed before it kept anything is no campaign yet
+        if new and self._db.execute("select 1 from meta limit 1").fetchone():
+            self._db.close()
+            hint = f"; continue it with: foreshock campaign resume {folder}"
+            raise ConfigError(str(folder), "holds a campaign already", hint)
 
     def __enter__(self) -> Ledger:
         return self
@@ -201,10 +203,15 @@ class Ledger:
 
     def meta(self, name: str, to: type[T]) -> T:
         """A fact about the campaign."""
-        found = self._db.execute("select value from meta where name = ?", (name,)).fetchone()
+        found = self.known(name, to)
         if found is None:
             raise ConfigError(LEDGER, f"{name} is missing: the campaign was never begun")
-        return msgspec.json.decode(found[0], type=to)
+        return found
+
+    def known(self, name: str, to: type[T]) -> T | None:
+        """A fact, or None if it was never kept."""
+        found = self._db.execute("select value from meta where name = ?", (name,)).fetchone()
+        return None if found is None else msgspec.json.decode(found[0], type=to)
 
     def put(self, row: Row, changes: tuple[Intervention, ...] = ()) -> None:
         """Keep a result, and the interventions of the run for those that take them."""

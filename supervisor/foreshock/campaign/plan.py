@@ -160,7 +160,7 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
 def _content(scenario: Scenario) -> dict[str, Any]:
     """What of a scenario decides a run: its files count by content, not by place."""
     tables: dict[str, Any] = msgspec.to_builtins(scenario)
-    return {k: v for k, v in tables.items() if k not in ("folder", "title", "severity", "expect")}
+    return {k: v for k, v in tables.items() if k not in ("folder", "title", "severity", "expect", "safe", "seed")}
 
 
 def _scenarios(spec: CampaignSpec, folder: Path, registry: Registry) -> list[tuple[Scenario, int]]:

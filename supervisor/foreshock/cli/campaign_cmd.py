@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 import msgspec
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
 from foreshock.campaign.again import Again, case_of
@@ -215,8 +215,7 @@ def _print_again(again: Again, changed: list[str]) -> None:
 
 def _go(found: Campaign, workers: int, dask: str | None, as_json: bool, *, retry: bool = False) -> int:
     runner = run_stream if dask is None else dask_runner(dask, found.plan)
-    total = len(found.plan.cases)
-    with _bar(total, as_json) as (estimated, told):
+    with _bar(len(found.plan.cases), len(found.rows()), as_json) as (estimated, told):
         complete = execute(found, workers, runner=runner, estimated=estimated, told=told, retry=retry)
     rows = found.rows()
     state = _state(found, rows, [])
@@ -270,21 +269,23 @@ def _print_state(state: dict[str, Any], rows: list[Row]) -> None:
 
 
 @contextmanager
-def _bar(total: int, quiet: bool) -> Iterator[tuple[Callable[[Estimate], None], Callable[[Progress], None]]]:
+def _bar(
+    total: int, known: int, quiet: bool
+) -> Iterator[tuple[Callable[[Estimate], None], Callable[[Progress], None]]]:
     """A progress bar with rate, time left and failures; and the estimate before the bulk of it."""
     with Bar(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[rate]:.1f} runs/s"),
-        TimeElapsedColumn(),
         TimeRemainingColumn(),
+        TextColumn("left"),
         TextColumn("{task.fields[failed]} failed"),
         console=notes,
         transient=True,
         disable=quiet,
     ) as bar:
-        task = bar.add_task("campaign", total=total, failed=0, rate=0.0)
+        task = bar.add_task("campaign", total=total, completed=known, failed=0, rate=0.0)
 
         def estimated(e: Estimate) -> None:
             if not quiet:

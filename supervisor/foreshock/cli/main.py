@@ -18,6 +18,7 @@ from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
 from foreshock.cli.doctor_cmd import doctor
 from foreshock.cli.events_cmd import events
+from foreshock.cli.falsify_cmd import falsify
 from foreshock.cli.gates_cmd import gates
 from foreshock.cli.journal_cmd import journal
 from foreshock.cli.operator_cmd import reset
@@ -76,7 +77,7 @@ def cli() -> None:
 
 
 COMMANDS = (
-    calibrate, campaign, config, demo, detectors, doctor, events, gates, journal, policies, replay, reset, run,
+    calibrate, campaign, config, demo, detectors, doctor, events, falsify, gates, journal, policies, replay, reset, run,
     scenarios, security, sensitivity, simulate, taxonomy, top, twin,
 )  # fmt: skip
 for command in COMMANDS:

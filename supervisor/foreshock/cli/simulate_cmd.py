@@ -46,7 +46,7 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
     help="Judges and acts, judges only, or off.",
 )
 @click.option("--policy", help="Use this policy instead of the scenario's.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of all randomness.")
+@click.option("--seed", type=click.IntRange(0), help="Of all randomness; the scenario's own (0) by default.")
 @click.option(
     "--set", "parameters", multiple=True, callback=_values, metavar="NAME=NUMBER", help="Set a parameter of the twin."
 )
@@ -64,7 +64,7 @@ def simulate(
     twin: str | None,
     arm: Arm,
     policy: str | None,
-    seed: int,
+    seed: int | None,
     parameters: dict[str, float],
     duration: float | None,
     timeout: float | None,
@@ -86,7 +86,9 @@ def simulate(
         found = msgspec.structs.replace(found, duration_s=duration)
     if journal is not None and arm == "off":
         raise BadInputError("--journal", "nothing decides with --supervisor off", "; take shadow")
-    job = Job(found, arm, seed, journal="" if journal is None else str(journal.resolve()))
+    job = Job(
+        found, arm, found.seed if seed is None else seed, journal="" if journal is None else str(journal.resolve())
+    )
     with Progress(console=notes, transient=True, disable=as_json) as progress:
         progress.add_task(f"{found.id} ({found.duration_s:g} s)", total=None)
         run = run_one(job, timeout)

@@ -83,6 +83,9 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         severity: the parameter to sweep, and its values; None if none was chosen.
         folder: where the file lies; relative paths start there.
         faults: of sensors, messages, actuators and detectors.
+        safe: what must hold, as a formula of signal temporal logic over the twin's probes, whose robustness leads
+            falsification; what an accident is, the referee says.
+        seed: of a simulation that names none.
     """
 
     id: str
@@ -97,9 +100,12 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     severity: Severity | None = None
     folder: str = ""
     faults: tuple[Fault, ...] = ()
+    safe: str = ""
+    seed: int = 0
 
     def __post_init__(self) -> None:
         within(f"{self.id}: duration_s", self.duration_s, 0.0, above=True)
+        within(f"{self.id}: seed", self.seed, 0)
         codes = builtin_taxonomy().codes
         if self.mode not in codes:
             hint = nearest(self.mode, codes)
