@@ -61,11 +61,13 @@ class AccessRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         name: common name of its certificate.
         write: key expressions that it may put to, and declare tokens on.
         ask: key expressions that it may query.
+        answer: key expressions on which it may answer queries.
     """
 
     name: str
     write: tuple[str, ...] = ()
     ask: tuple[str, ...] = ()
+    answer: tuple[str, ...] = ()
 
 
 class LinkSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -202,15 +204,16 @@ def _file(base: Path, place: str, name: str) -> str:
 
 
 def _access(rules: tuple[AccessRule, ...]) -> dict[str, Any]:
-    """Zenoh's access control: denied by default; everybody may read; writing and asking by name."""
-    reading = ["declare_subscriber", "liveliness_query", "declare_liveliness_subscriber", "reply", "declare_queryable"]
+    """Zenoh's access control: denied by default; everybody may read; writing, asking and answering by name."""
+    reading = ["declare_subscriber", "liveliness_query", "declare_liveliness_subscriber", "reply"]
+    everything = ["**", "foreshock/*/@/**", "@ros2_lv/**"]  # no wildcard meets a chunk that begins with @
     # a denial outweighs any permission; the supervisor's own session does not come in over a link
-    own = {**_rule("own", ["put", "delete"], [f"foreshock/*/_/{s}" for s in OWN], ["ingress"]), "permission": "deny"}
+    own = {**_rule("own", ["put", "delete"], [f"foreshock/*/@/{s}" for s in OWN], ["ingress"]), "permission": "deny"}
     out: list[dict[str, Any]] = [
         own,
-        _rule("read", reading, ["**"], ["ingress", "egress"]),
+        _rule("read", reading, everything, ["ingress", "egress"]),
         # what may come in may go on to everybody: the check is where it enters
-        _rule("deliver", ["put", "delete", "query", "liveliness_token"], ["**"], ["egress"]),
+        _rule("deliver", ["put", "delete", "query", "liveliness_token", "declare_queryable"], everything, ["egress"]),
     ]
     subjects, policies = [], []
     for k, rule in enumerate(rules):
@@ -221,6 +224,9 @@ def _access(rules: tuple[AccessRule, ...]) -> dict[str, Any]:
         if rule.ask:
             out.append(_rule(f"ask-{k}", ["query"], list(rule.ask), ["ingress"]))
             mine.append(f"ask-{k}")
+        if rule.answer:
+            out.append(_rule(f"answer-{k}", ["declare_queryable"], list(rule.answer), ["ingress"]))
+            mine.append(f"answer-{k}")
         subjects.append({"id": f"subject-{k}", "cert_common_names": [rule.name]})
         policies.append({"rules": mine, "subjects": [f"subject-{k}"]})
     return {

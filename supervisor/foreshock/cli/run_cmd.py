@@ -9,7 +9,7 @@ import click
 
 from foreshock.cli.output import OK, console, emit, notes
 from foreshock.errors import BadInputError
-from foreshock.live import LiveSupervisor, load_run
+from foreshock.live import LiveSupervisor, load_run, watch_log
 from foreshock.records import Decision, ProtectionLevel
 
 __all__ = ["run"]
@@ -28,7 +28,8 @@ def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool
     """
     if journal is not None and journal.exists():
         raise BadInputError("--journal", f"{journal} exists; a journal is never overwritten", "; choose another name")
-    live = LiveSupervisor(load_run(config), config.parent, journal=journal)
+    loaded = load_run(config)
+    live = LiveSupervisor(loaded, config.parent, journal=journal, denied=watch_log(loaded.link))
     stop = threading.Event()
     last = ProtectionLevel.NORMAL
     timer = threading.Timer(seconds, stop.set) if seconds is not None else None

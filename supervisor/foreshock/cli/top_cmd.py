@@ -103,10 +103,17 @@ def view(s: Status) -> Group:
     health = _grid("not ok", "")
     for source, why in s.health.items():
         health.add_row(source, why)
+    away = _grid("turned away", "times", "last")
+    for r in s.refused:
+        away.add_row(f"no connection: {r.reason}", str(r.count), f"{r.age_s:.0f} s ago")
+    for d in s.denied:
+        away.add_row(f"{d.name or d.zid}: {d.what} {d.key}", str(d.count), f"{d.age_s:.0f} s ago")
     two = Table.grid(expand=True, padding=(0, 1))
     two.add_row(Panel(modes, title="trust by mode"), Panel(now, title="now"))
-    last = Panel(health, title="health", border_style="yellow") if s.health else Text()
-    return Group(head, two, Panel(streams, title="streams"), last)
+    last = [Panel(health, title="health", border_style="yellow")] if s.health else []
+    if s.refused or s.denied:
+        last.append(Panel(away, title="link", border_style="red"))
+    return Group(head, two, Panel(streams, title="streams"), *last)
 
 
 def _grid(*columns: str) -> Table:

@@ -53,7 +53,7 @@ class Services:
     def peers(self) -> tuple[str, ...]:
         """Tokens that are up: ``<role>/<name>``."""
         while (token := self._tokens.try_recv()) is not None:
-            name = str(token.key_expr).partition("/_/alive/")[2]
+            name = str(token.key_expr).partition("/@/alive/")[2]
             if token.kind == self._put:
                 if len(self._alive) < 256:
                     self._alive[name] = None
