@@ -33,6 +33,7 @@ from foreshock.messages import (
     WrenchStamped,
 )
 from foreshock.wire import ROS_NAMES, Codec, decode_reference, encode_reference, ros_type, typestore
+from foreshock.wire._hot import learn
 
 NUMBER = st.floats(width=64)
 VEC3 = st.tuples(NUMBER, NUMBER, NUMBER)
@@ -186,3 +187,14 @@ def test_no_stream_of_changing_shapes_fills_the_memory() -> None:
         assert codec.decode(JointState, codec.encode(message, k))[0] == message
     assert len(codec._out) <= 64
     assert sum(map(len, codec._in.values())) <= 64 * 4
+
+
+def test_a_message_too_large_for_a_layout_is_read_by_the_reference() -> None:
+    """Learning would take time with the square of the numbers, and a peer chooses how many there are."""
+    names = tuple(f"joint-{k}" for k in range(3_000))
+    message = JointState(names, (0.5,) * 3_000, (1.5,) * 3_000)
+    assert learn(message, encode_reference) is None
+    codec = Codec()
+    data = codec.encode(message, 7)
+    assert data == encode_reference(message, 7)
+    assert codec.decode(JointState, data) == (message, 7)

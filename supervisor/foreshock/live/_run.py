@@ -19,6 +19,7 @@ from foreshock.link import keys_of, open_link, ros_tokens
 from foreshock.live._config import RunConfig
 from foreshock.live._denied import DeniedPeers
 from foreshock.live._handshake import Handshakes
+from foreshock.live._intake import Intake
 from foreshock.live._journal import SegmentedJournal
 from foreshock.live._publish import decision_bytes
 from foreshock.live._robot import RobotLink
@@ -26,7 +27,7 @@ from foreshock.live._services import Services
 from foreshock.live._status import Status, TickTimes, stream_status
 from foreshock.live._stream import Stream
 from foreshock.recording import Head, McapJournal
-from foreshock.records import Decision, ProtectionLevel, Sample
+from foreshock.records import Decision, ProtectionLevel
 from foreshock.registry import Registry
 from foreshock.supervisor import Supervisor
 from foreshock.wire import ROS_NAMES, Codec, typestore
@@ -72,6 +73,7 @@ class LiveSupervisor:
                 Stream(self._session, keys, channel, cls, codec, run.live.max_skew_s)
                 for channel, cls in sorted(channels.items())
             ]
+            self._intake = Intake(self._streams, self.supervisor.period_ns)
             self._robot = RobotLink(self._session, keys, run.live, self.epoch)
             self._decisions = self._session.declare_publisher(keys.service("decision"))
             self._services = Services(self._session, keys)
@@ -129,9 +131,7 @@ class LiveSupervisor:
 
         Nobody may move then, since no lease is granted.
         """
-        samples: list[Sample] = []
-        for stream in self._streams:
-            samples += stream.drain(now_ns)
+        samples = self._intake.drain(now_ns)
         if self._missing:
             self._missing = self._silent()
             if self._missing:

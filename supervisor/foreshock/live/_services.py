@@ -18,6 +18,8 @@ from foreshock.wire import Keys
 __all__ = ["ResetRequest", "Services"]
 
 RING = 16
+AT_ONCE = 4
+"""Questions of a kind that are answered in one tick; the others wait in their ring."""
 MOST_BYTES = 10_000
 
 
@@ -48,6 +50,7 @@ class Services:
             keys.alive("**", "").rstrip("/"), zenoh.handlers.RingChannel(256), history=True
         )
         self._alive: dict[str, None] = {}
+        self._drop = zenoh.CongestionControl.DROP
         self._put = zenoh.SampleKind.PUT
 
     def peers(self) -> tuple[str, ...]:
@@ -85,25 +88,25 @@ class Services:
         history: Iterable[tuple[int, bytes]],
     ) -> None:
         """Answer what was asked since the last tick."""
-        for query in _taken(self._asked["status"]):
-            _reply(query, msgspec.json.encode(status()))
-        for query in _taken(self._asked["taxonomy"]):
-            _reply(query, msgspec.json.encode(taxonomy))
-        for query in _taken(self._asked["config"]):
-            _reply(query, msgspec.json.encode(run.config))
-        for query in _taken(self._asked["history"]):
+        answers: dict[str, Callable[[], bytes]] = {
+            "status": lambda: msgspec.json.encode(status()),
+            "taxonomy": lambda: msgspec.json.encode(taxonomy),
+            "config": lambda: msgspec.json.encode(run.config),
             # length before each: a list of CDR payloads in one reply, so that they come in order or not at all
-            _reply(query, b"".join(len(data).to_bytes(4, "little") + data for _, data in history))
+            "history": lambda: b"".join(len(data).to_bytes(4, "little") + data for _, data in history),
+        }
+        for name, give in answers.items():
+            answer = None
+            for query in _taken(self._asked[name], AT_ONCE):
+                answer = give() if answer is None else answer
+                # a peer that asks and takes no answer must not keep the tick waiting
+                query.reply(query.key_expr, answer, congestion_control=self._drop)
+                query.drop()
 
 
-def _taken(queryable: Any) -> Iterator[Any]:
-    for _ in range(RING):
+def _taken(queryable: Any, most: int = RING) -> Iterator[Any]:
+    for _ in range(most):
         query = queryable.try_recv()
         if query is None:
             return
         yield query
-
-
-def _reply(query: Any, payload: bytes) -> None:
-    query.reply(query.key_expr, payload)
-    query.drop()

@@ -77,29 +77,22 @@ class Stream:
         self._sequence = -1
         self._stamp_ns = -1
 
-    def drain(self, now_ns: int) -> list[Sample]:
-        """Samples that arrived since the last call; now_ns is the time of the tick."""
-        waiting = []
-        for _ in range(RING):
-            raw = self._subscriber.try_recv()
-            if raw is None:
-                break
-            waiting.append(raw)
-        if not waiting:
-            return []
-        # after the last was taken, so that none of them can have come later: decoding may take its time
+    def take(self, now_ns: int) -> tuple[Sample | None, int] | None:
+        """The oldest that waits and its length in bytes; no sample if it is none that counts, None if nothing waits.
+
+        Args:
+            now_ns: time of the tick.
+        """
+        raw = self._subscriber.try_recv()
+        if raw is None:
+            return None
         arrival_ns = monotonic_ns()
-        found: list[Sample] = []
-        for raw in waiting:
-            try:
-                sample = self._read(raw, now_ns, arrival_ns)
-            except WireError as e:
-                self.counts.garbage += 1
-                self.counts.last_fault = str(e)
-                continue
-            if sample is not None:
-                found.append(sample)
-        return found
+        try:
+            return self._read(raw, now_ns, arrival_ns), min(len(raw.payload), MAX_BYTES)
+        except WireError as e:
+            self.counts.garbage += 1
+            self.counts.last_fault = str(e)
+            return None, 0
 
     def _read(self, raw: Any, now_ns: int, arrival_ns: int) -> Sample | None:
         counts = self.counts

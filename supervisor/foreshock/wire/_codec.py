@@ -12,7 +12,7 @@ from foreshock.wire._types import typestore
 
 __all__ = ["MAX_BYTES", "Codec", "decode_reference", "decode_ros", "encode_reference", "encode_ros"]
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = 250_000
 """A payload longer than this is refused unread: no message of ours comes near it."""
 MOST_LAYOUTS = 64
 """A peer that changes its joint names with every message must not fill the memory."""
