@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,7 +30,6 @@ __all__ = [
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 OWN = ("lease", "intervention", "decision")
 """Services that only the supervisor writes."""
-LOOPBACK = ("127.", "localhost", "[::1]", "::1")
 
 
 class TlsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -107,13 +107,22 @@ class LinkSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 protocol, _, address = endpoint.partition("/")
                 if protocol not in ("tcp", "tls") or not address:
                     raise ConfigError(f"link.{name}", f"{endpoint!r} is no endpoint", "; e.g. 'tcp/127.0.0.1:7447'")
-                if not self.remote and not address.startswith(LOOPBACK):
+                if not self.remote and not _is_loopback(address):
                     hint = "; set link.remote = true if this is meant, and certificates under [link.tls]"
                     raise ConfigError(f"link.{name}", f"{endpoint!r} is beyond this machine", hint)
                 if (protocol == "tls") != bool(self.tls.ca):
                     raise ConfigError(f"link.{name}", f"{endpoint!r} and [link.tls] do not go together")
         if self.access and not self.tls.ca:
             raise ConfigError("link.access", "needs certificates under [link.tls]: names come from there")
+
+
+def _is_loopback(address: str) -> bool:
+    """Whether ``host:port`` is of this machine alone; a name that only begins like its address is not."""
+    host = address.rpartition(":")[0].strip("[]")
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def keys_of(link: LinkSettings, robot: str) -> Keys:

@@ -73,6 +73,15 @@ class LeaseModel(RuleBasedStateMachine):
     def somebody_forges(self, epoch: int, nonce: int, guard_ns: int, ttl_ns: int) -> None:
         self.flying.append(Lease(epoch, nonce, guard_ns, ttl_ns))
 
+    @rule(epoch=st.integers(0, 4))
+    def a_supervisor_of_some_epoch_is_heard(self, epoch: int) -> None:
+        """By an intervention: leases of an older one are refused from now on."""
+        seen = self.epoch_taken if self.epoch_taken is not None else -1
+        assert self.guard.fence(epoch) == (epoch >= seen)
+        if epoch >= seen:
+            self.epoch_taken = epoch
+            self.epoch_seen = max(epoch, self.epoch_seen if self.epoch_seen is not None else epoch)
+
     @precondition(lambda self: self.flying)
     @rule(which=st.integers(0, 1_000), again=st.booleans())
     def a_lease_arrives(self, which: int, again: bool) -> None:

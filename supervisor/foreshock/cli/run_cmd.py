@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 from pathlib import Path
 
@@ -47,6 +48,8 @@ def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool
     if timer is not None:
         timer.daemon = True
         timer.start()
+    gc.collect()
+    gc.freeze()  # a full collection would walk through all that set-up made, in the middle of a tick
     try:
         final = live.run(stop, ticked)
     finally:

@@ -33,6 +33,7 @@ class Intake:
     def __init__(self, streams: Sequence[Stream], period_ns: int) -> None:
         self._streams = list(streams)
         self._budget_ns = self._left_ns = period_ns // 2
+        self._spent_ns = 0
         self._credit = [0] * len(self._streams)
 
     def drain(self, now_ns: int) -> list[Sample]:
@@ -40,6 +41,7 @@ class Intake:
         found: list[Sample] = []
         owed_ns = max(min(self._left_ns, 0), -MOST_OWED * self._budget_ns)
         self._left_ns = owed_ns + self._budget_ns
+        self._spent_ns = thread_cpu_ns()
         waiting = list(range(len(self._streams)))
         while waiting and self._left_ns > 0:
             waiting = [k for k in waiting if self._spend(k, now_ns, found)]
@@ -49,7 +51,6 @@ class Intake:
         """Let a stream spend its credit; whether more of it may be waiting."""
         self._credit[k] += CREDIT_NS
         while self._credit[k] > 0:
-            began_ns = thread_cpu_ns()
             taken = self._streams[k].take(now_ns)
             if taken is None:
                 self._credit[k] = 0
@@ -57,7 +58,9 @@ class Intake:
             sample, size = taken
             if sample is not None:
                 found.append(sample)
-            cost_ns = thread_cpu_ns() - began_ns + EACH_NS + BYTE_NS * size
+            spent_ns = thread_cpu_ns()
+            cost_ns = spent_ns - self._spent_ns + EACH_NS + BYTE_NS * size
+            self._spent_ns = spent_ns
             self._credit[k] -= cost_ns
             self._left_ns -= cost_ns
         return True

@@ -253,8 +253,8 @@ class LiveSupervisor:
             return McapJournal(self._journal_file, head)
         if not settings.folder:
             return None
-        stem = f"{self._run.config.supervisor.robot}-{self.epoch}"
-        return SegmentedJournal(base / settings.folder, stem, head, settings, self.epoch / NS_PER_S)
+        robot = self._run.config.supervisor.robot
+        return SegmentedJournal(base / settings.folder, robot, self.epoch, head, settings, self.epoch / NS_PER_S)
 
 
 def _channels(run: RunConfig, supervisor: Supervisor) -> dict[str, type]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -50,6 +51,7 @@ class Services:
             keys.alive("**", "").rstrip("/"), zenoh.handlers.RingChannel(256), history=True
         )
         self._alive: dict[str, None] = {}
+        self._lost: type[Exception] = zenoh.ZError
         self._drop = zenoh.CongestionControl.DROP
         self._put = zenoh.SampleKind.PUT
 
@@ -74,9 +76,11 @@ class Services:
                 request = msgspec.json.decode(payload, type=ResetRequest)
                 record = supervisor.operator_reset(request.who, request.why, now_ns, request.dimension)
             except (BadInputError, msgspec.MsgspecError) as e:
-                query.reply_err(str(e).encode())
+                with suppress(self._lost):
+                    query.reply_err(str(e).encode())
             else:
-                query.reply(query.key_expr, msgspec.json.encode(record))
+                with suppress(self._lost):  # it is done and recorded, even where nobody waits for the answer
+                    query.reply(query.key_expr, msgspec.json.encode(record), congestion_control=self._drop)
                 yield record
             query.drop()
 
@@ -100,7 +104,8 @@ class Services:
             for query in _taken(self._asked[name], AT_ONCE):
                 answer = give() if answer is None else answer
                 # a peer that asks and takes no answer must not keep the tick waiting
-                query.reply(query.key_expr, answer, congestion_control=self._drop)
+                with suppress(self._lost):
+                    query.reply(query.key_expr, answer, congestion_control=self._drop)
                 query.drop()
 
 

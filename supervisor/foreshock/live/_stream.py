@@ -16,6 +16,9 @@ __all__ = ["Stream", "StreamCounts"]
 
 RING = 256
 """Of a stream that floods, the oldest samples are lost, and none of another stream."""
+MOST_GAPS = 1 << 53
+MOST_NS = 1 << 61
+"""Stamps beyond (73 years from either epoch) are no times, and sums of them would leave 64 bits."""
 SILENT_NS = 1_000_000_000
 """Another sender is believed when the first has been silent for so long."""
 
@@ -107,12 +110,14 @@ class Stream:
             raise WireError(self.channel, f"{len(raw.payload)} bytes, at most {MAX_BYTES} are read")
         message, header_ns = self._codec.decode(self._cls, raw.payload.to_bytes())
         stamp_ns = attachment.stamp_ns if header_ns is None else header_ns
+        if not -MOST_NS < stamp_ns < MOST_NS:
+            raise WireError(self.channel, f"a stamp of {stamp_ns} ns is no time")
         sequence = attachment.sequence
         if sequence == self._sequence and stamp_ns == self._stamp_ns:
             counts.repeated += 1
             return None
         if self._sequence >= 0 and sequence > self._sequence + 1:
-            counts.gaps += sequence - self._sequence - 1
+            counts.gaps = min(counts.gaps + sequence - self._sequence - 1, MOST_GAPS)
         if stamp_ns < self._stamp_ns:
             counts.backwards += 1
             counts.last_fault = f"a stamp {(self._stamp_ns - stamp_ns) / 1e6:.1f} ms before the one before it"
