@@ -185,10 +185,10 @@ def _options(link: LinkSettings, base: Path) -> dict[str, Any]:
         "scouting/gossip/enabled": False,
         "transport/link/tx/lease": round(link.lease_s * 1000),
         "transport/link/rx/max_message_size": 4_194_304,
-        # whoever puts waits no longer (us) for a peer that takes nothing
-        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 100,
-        "transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments": 5_000,
     }
+    if link.mode == "router":
+        # a long answer waits no longer (us) for a peer that takes nothing
+        options["transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments"] = 5_000
     if link.mode == "peer":
         options["connect/exit_on_failure"] = False
         options["connect/timeout_ms"] = -1

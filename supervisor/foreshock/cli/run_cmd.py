@@ -39,7 +39,8 @@ def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool
         nonlocal last
         if decision.level is not last:
             modes = ", ".join(m for m, level in decision.levels.items() if level)
-            notes.print(f"level {decision.level.name.lower().replace('_', '-')} {modes}", markup=False)
+            said = f"level {decision.level.name.lower().replace('_', '-')} {modes}".rstrip()
+            notes.print(said, markup=False)
             last = decision.level
 
     if not as_json:

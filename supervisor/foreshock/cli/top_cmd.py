@@ -74,7 +74,10 @@ def view(s: Status) -> Group:
         (f" {s.robot} ", "bold"),
         (f" {s.level or 'no tick yet'} ".replace("_", "-"), f"reverse {colour}"),
         f"  trust {s.trust:.2f}  control {s.control_trust:.2f}   ",
-        ("may move" if s.motion_permitted else f"may NOT move {s.withheld}", "green" if s.motion_permitted else "red"),
+        (
+            "may move" if s.motion_permitted else "may NOT move" + (f": {s.withheld}" if s.withheld else ""),
+            "green" if s.motion_permitted else "red",
+        ),
         f"\n up {s.uptime_s:.0f} s, tick {s.tick}: {median:.2f} ms median, {p99:.2f} p99, {most:.2f} most, "
         f"{s.overruns} overruns, {s.leases} leases",
     )
