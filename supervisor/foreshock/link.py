@@ -110,8 +110,9 @@ class LinkSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 if not self.remote and not _is_loopback(address):
                     hint = "; set link.remote = true if this is meant, and certificates under [link.tls]"
                     raise ConfigError(f"link.{name}", f"{endpoint!r} is beyond this machine", hint)
+                hint = "; a tls/ endpoint needs ca, certificate and key, another one takes none"
                 if (protocol == "tls") != bool(self.tls.ca):
-                    raise ConfigError(f"link.{name}", f"{endpoint!r} and [link.tls] do not go together")
+                    raise ConfigError(f"link.{name}", f"{endpoint!r} and [link.tls] do not go together", hint)
         if self.access and not self.tls.ca:
             raise ConfigError("link.access", "needs certificates under [link.tls]: names come from there")
 
@@ -153,7 +154,8 @@ def open_link(link: LinkSettings, base: Path | None = None) -> zenoh.Session:
         return zenoh.open(config)
     except zenoh.ZError as e:
         where = ", ".join((*link.listen, *link.connect))
-        raise BadInputError("link", f"cannot be opened on {where}: {e}") from None
+        why = str(e).partition(" at /")[0]  # what follows is a place in Zenoh's sources
+        raise BadInputError("link", f"cannot be opened on {where}: {why}") from None
 
 
 def ros_tokens(session: Any, keys: Keys, kind: Literal["MP", "MS"], channels: Mapping[str, str]) -> list[Any]:

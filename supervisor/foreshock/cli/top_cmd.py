@@ -34,7 +34,9 @@ def ask(session: Any, key: str, payload: bytes = b"", timeout_s: float = 2.0) ->
             raise BadInputError(key, reply.err.payload.to_string())
         answer: bytes = reply.ok.payload.to_bytes()
         return answer
-    raise BadInputError(key, f"no answer within {timeout_s:g} s", "; is a supervisor running there?")
+    raise BadInputError(
+        key, f"no answer within {timeout_s:g} s", "; is a supervisor running there, and may you ask this?"
+    )
 
 
 @click.command()
