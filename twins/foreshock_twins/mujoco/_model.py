@@ -287,6 +287,7 @@ class Body:
             name = f"{key}-payload"
             child = body.add_body(name=name, pos=placement.translation)
             child.mass, child.inertia, child.explicitinertial = 1e-6, [1e-9, 1e-9, 1e-9], True
+            spec.add_exclude(bodyname1=body.name, bodyname2=name)  # what is referred to is not fused with its parent
             self.payloads[key] = name
         _, placement = self._carrier(spec, self.torso)
         self.torso_offset = placement
