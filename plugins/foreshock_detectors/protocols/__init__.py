@@ -29,7 +29,9 @@ __all__ = [
 def foreshock_policies() -> Sequence[PolicySpec]:
     """The policies ``protocol`` and ``by-cause``."""
     summary = "the actions that fit one accident mode, cheap ones at caution, protective ones at T < 0.3"
-    chooses = "the actions that help against what came first, from caution on or once an accident is predicted; A1 to A3"
+    chooses = (
+        "the actions that help against what came first, from caution on or once an accident is predicted; A1 to A3"
+    )
     return [
         PolicySpec("protocol", ProtocolPolicy, ProtocolConfig, MODE_ACTIONS, summary),
         PolicySpec("by-cause", ByCause, ByCauseConfig, MODE_ACTIONS, chooses),

@@ -51,7 +51,9 @@ CAUSES: Mapping[str, Causes] = {
     ),
     "A2": Causes(
         (
-            Cause(("excessive-arm-velocity", "rapid-torso-recovery"), ("soften-arms",), ("soften-arms", "withdraw-arm")),
+            Cause(
+                ("excessive-arm-velocity", "rapid-torso-recovery"), ("soften-arms",), ("soften-arms", "withdraw-arm")
+            ),
             Cause(("human-proximity-breach",), ("soften-arms", "withdraw-arm")),
         ),
         predicted=("soften-arms", "withdraw-arm"),

@@ -36,7 +36,9 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
 
 @click.command()
 @click.argument("scenario")
-@click.option("--twin", help="Kind of twin, or KIND:ENDPOINT; the scenario's variant on it if there is one; its own by default.")
+@click.option(
+    "--twin", help="Kind of twin, or KIND:ENDPOINT; the scenario's variant on it if there is one; its own by default."
+)
 @click.option(
     "--supervisor",
     "arm",

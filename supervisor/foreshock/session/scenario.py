@@ -18,7 +18,16 @@ from foreshock.registry import Broken, Registry
 from foreshock.session.faults import Fault
 from foreshock.taxonomy import builtin_taxonomy
 
-__all__ = ["VARIANT", "Distribution", "Scenario", "Severity", "broken_scenarios", "find_scenario", "load_scenario", "scenario_ids"]
+__all__ = [
+    "VARIANT",
+    "Distribution",
+    "Scenario",
+    "Severity",
+    "broken_scenarios",
+    "find_scenario",
+    "load_scenario",
+    "scenario_ids",
+]
 
 
 VARIANT = "@"

@@ -44,7 +44,7 @@ from foreshock.hookspecs import hookimpl
 from foreshock.twin import Twin, TwinSpec
 from foreshock_twins.mujoco._robot import RobotConfig, robot_files
 
-__all__ = ["MujocoTwinConfig", "RobotConfig", "build_twin", "foreshock_twins", "twin_files"]
+__all__ = ["MujocoTwinConfig", "RobotConfig", "build_twin", "foreshock_scenarios", "foreshock_twins", "twin_files"]
 
 
 class MujocoTwinConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -95,3 +95,9 @@ def foreshock_twins() -> Sequence[TwinSpec]:
     """The twin kind ``mujoco``."""
     summary = "A whole-body humanoid in MuJoCo, TALOS by default"
     return [TwinSpec("mujoco", build_twin, MujocoTwinConfig, summary, twin_files)]
+
+
+@hookimpl
+def foreshock_scenarios() -> Sequence[Path]:
+    """The scenarios of this twin: those of the FMU plants under their ids with ``@mujoco``, and falls by cause."""
+    return sorted((Path(__file__).parent / "scenarios").glob("*.toml"))
