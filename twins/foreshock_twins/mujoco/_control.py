@@ -53,6 +53,7 @@ _LOCK_GAIN = 1.0
 _LANDING_S = 0.15
 _RESUME_S = 1.0
 _VELOCITY_FILTER_S = 0.01
+_FORWARD_FILTER_S = 0.02
 _STIFFER, _DAMPER = 0.5, 0.67
 _SHORTER, _LOWER = 0.6, 0.5
 _ARMS_SOFTER = 0.9
@@ -141,16 +142,20 @@ class Controller:
         self.gait = Gait(settings, (feet[0], feet[1]), com, 1 if p["first_support"] > 0.0 else 0)
         self._ik.solve(self._com_target(), [(f, 0.0) for f in feet], 0.0, 25)
         self.frame = Plane()
-        self.target = self._ik.q[body.pin_q].copy()
-        self.planned = (self.target.copy(), np.zeros_like(self.target))
+        q = self._ik.q[body.pin_q].copy()
+        self.planned = (q, np.zeros_like(q))
         self.asked: dict[str, float] = dict.fromkeys(ACTIONS, 0.0)
         self.strengths: dict[str, float] = dict.fromkeys(ACTIONS, 0.0)
         self.error = (0.0, 0.0)
         self.falling = False
         self._references: deque[tuple[int, tuple[float, float]]] = deque(maxlen=256)
         self._velocity: Floats | None = None
+        self._plan_rate: Floats = np.zeros(body.pin_model.nv)
+        self._plan_acceleration: Floats = np.zeros(body.pin_model.nv)
+        self._torque = self._ik.torques(self._plan_rate, self._plan_acceleration, (0.5, 0.5))[body.pin_v]
         self._released_s = self._length_m = 0.0
-        self._stiffness, self._damping = self._body.stiffness.copy(), self._body.damping.copy()
+        self._stiffness, self._damping = body.stiffness.copy(), body.damping.copy()
+        self.target = q + self._torque / self._stiffness
         self.soles: list[tuple[float, float, float, float]] = [(f.x, f.y, 0.0, 0.0) for f in feet]
         self.com: tuple[Floats, Floats] = (np.array([*com, settings.com_z_m]), np.zeros(3))
         return self._ik.q.copy()
@@ -261,8 +266,21 @@ class Controller:
         self._arms = arms
         feet = [gait.foot(k) for k in (0, 1)]
         yaw = 0.5 * (feet[0][0].yaw + feet[1][0].yaw)
-        q = self._ik.solve(self._com_target(), [(place, height) for place, height, _ in feet], yaw)[self._body.pin_q]
+        before = self._ik.q.copy()
+        full = self._ik.solve(self._com_target(), [(place, height) for place, height, _ in feet], yaw)
+        q = full[self._body.pin_q]
         self.planned = (q, (q - self.planned[0]) / self._dt)
+        self._feed_forward(pin.difference(self._body.pin_model, before, full) / self._dt)
+
+    def _feed_forward(self, v: Floats) -> None:
+        """Torques that the plan needs; the targets lead the plan by so much that the servos give them."""
+        a = (v - self._plan_rate) / self._dt
+        self._plan_rate = v
+        weight = self._dt / (self._dt + _FORWARD_FILTER_S)
+        self._plan_acceleration = self._plan_acceleration + weight * (a - self._plan_acceleration)
+        torque = self._ik.torques(v, self._plan_acceleration, self.gait.shares)[self._body.pin_v]
+        torque += self._body.damping * v[self._body.pin_v]
+        self._torque = self._torque + weight * (torque - self._torque)
 
     def _anchor(self) -> None:
         """Lay the plan's frame so that the foot that stands now is where it was measured."""
@@ -277,7 +295,7 @@ class Controller:
 
     def _feed_back(self, measured: Measured, blind: bool) -> None:
         body, gait = self._body, self.gait
-        q = self.planned[0].copy()
+        q = self.planned[0] + self._torque / self._stiffness
         reference = next((xi for stamp, xi in reversed(self._references) if stamp <= measured.stamp_ns), gait.xi)
         xi = self._measured_xi()
         self.error = error = (xi[0] - reference[0], xi[1] - reference[1])

@@ -62,6 +62,21 @@ class InverseKinematics:
             self.q = pin.integrate(model, self.q, self._dq)
         return self.q
 
+    def torques(self, v: Floats, a: Floats, shares: tuple[float, float]) -> Floats:
+        """Joint torques (N m, Pinocchio, nv) of a motion v, a at q, when each sole carries its share of the ground.
+
+        Inverse dynamics without contact asks a wrench b of the base, which the soles give: J_k' w_k = share_k b.
+        """
+        model, data = self._model, self._data
+        torque: Floats = np.array(pin.rnea(model, data, self.q, v, a))
+        base = torque[:6].copy()
+        pin.computeJointJacobians(model, data, self.q)
+        for frame, share in zip(self._soles, shares, strict=True):
+            if share > 0.0:
+                jacobian = pin.computeFrameJacobian(model, data, self.q, frame, pin.LOCAL)
+                torque -= jacobian.T @ np.linalg.solve(jacobian[:, :6].T, share * base)
+        return torque
+
     def error(self) -> float:
         """Largest error before the last step (m or rad)."""
         return float(np.abs(self._errors).max())

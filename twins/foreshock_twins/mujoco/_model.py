@@ -287,7 +287,9 @@ class Body:
             name = f"{key}-payload"
             child = body.add_body(name=name, pos=placement.translation)
             child.mass, child.inertia, child.explicitinertial = 1e-6, [1e-9, 1e-9, 1e-9], True
-            spec.add_exclude(bodyname1=body.name, bodyname2=name)  # what is referred to is not fused with its parent
+            # a body that a sensor refers to is not fused with the one that carries it
+            kind, body_type = mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtObj.mjOBJ_BODY
+            spec.add_sensor(name=name, type=kind, objtype=body_type, objname=name)
             self.payloads[key] = name
         _, placement = self._carrier(spec, self.torso)
         self.torso_offset = placement

@@ -192,6 +192,7 @@ class MujocoTwin:
         disturbances.apply(control.gait.swing, share, (x, y, foothold.yaw + control.frame.yaw))
         weak, left = disturbances.weak
         if left < 1.0:
+            stiffness, damping = stiffness.copy(), damping.copy()  # the controller knows nothing of it
             stiffness[weak] *= left
             damping[weak] *= left
             limit = body.model.actuator_forcerange[body.actuators[weak]]
@@ -291,8 +292,9 @@ class MujocoTwin:
         load = x = y = 0.0
         for site, wrench in zip(self._sensors.sole_sites, self._sensors.true_wrenches(data), strict=True):
             r, p = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
-            f, t = r @ wrench[:3], r @ wrench[3:] + np.cross(p, r @ wrench[:3])
-            load, x, y = load + f[2], x - t[1], y + t[0]
+            (fx, fy, fz), (tx, ty, _) = (r @ wrench[:3]).tolist(), (r @ wrench[3:]).tolist()
+            px, py, pz = p.tolist()
+            load, x, y = load + fz, x + px * fz - pz * fx - ty, y + py * fz - pz * fy + tx
         if load > _LOADED_N:
             self._pressure = float(x / load), float(y / load)
         return self._pressure

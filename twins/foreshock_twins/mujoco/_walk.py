@@ -161,6 +161,23 @@ class Gait:
         return (0, 1) if self.swing < 0 else (1 - self.swing,)
 
     @property
+    def shares(self) -> tuple[float, float]:
+        """Shares of the weight that the left and the right foot carry by the plan."""
+        if self.swing >= 0:
+            return (0.0, 1.0) if self.swing == 0 else (1.0, 0.0)
+        if self.settling:
+            p = self.com
+        else:
+            segment = self._plan[0]
+            u = min(1.0, self._t / segment.duration_s)
+            p = tuple(a + u * (b - a) for a, b in zip(segment.p0, segment.p1, strict=True))  # type: ignore[assignment]  # two
+        (ax, ay), (bx, by) = self._middle(0), self._middle(1)
+        dx, dy = bx - ax, by - ay
+        right = ((p[0] - ax) * dx + (p[1] - ay) * dy) / (dx * dx + dy * dy)
+        right = min(1.0, max(0.0, right))
+        return 1.0 - right, right
+
+    @property
     def landing(self) -> tuple[float, Foothold]:
         """Share of the swing that is over, and where the foot goes; 0 and a standing foot if none swings."""
         if self.swing < 0:
