@@ -1,4 +1,4 @@
-"""Intervention protocols of all accident modes, as the policy ``protocol``, and ``by-cause``, which chooses among actions."""
+"""Intervention protocols of all accident modes as the policy ``protocol``; ``by-cause`` chooses by what came first."""
 
 from __future__ import annotations
 

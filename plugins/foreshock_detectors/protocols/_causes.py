@@ -1,4 +1,4 @@
-"""Which actions help against which first sign: A1 to A3, where an action that helps against one cause harms in another."""
+"""Which actions help against which first sign: A1 to A3, where what helps against one cause harms in another."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ STEADY = ("step-suppression", "balance-lock")
 
 
 class Cause(msgspec.Struct, frozen=True):
-    """What is done when one of these kinds was the first to come; sooner than urgent_s before the accident, the more."""
+    """What is done when one of these kinds came first, and what when the accident is nearer than urgent_s."""
 
     kinds: tuple[str, ...]
     actions: tuple[str, ...]
@@ -73,4 +73,4 @@ CAUSES: Mapping[str, Causes] = {
         urgent_s=1.0,
     ),
 }
-"""A1 by a map of all subsets of the four protocols against the disturbances of the twin ``mujoco``, on seeds from 50000."""
+"""A1 by a map of subsets of the four protocols against the disturbances of the twin ``mujoco``, seeds from 50000."""
