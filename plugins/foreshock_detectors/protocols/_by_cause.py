@@ -71,6 +71,6 @@ class ByCause:
             return causes.after, "the evidence has gone, the level stands"
         first = min(known)[1]
         cause = self._by_kind[first]
-        if cause.urgent and left_s is not None and left_s < causes.urgent_s:
-            return cause.urgent, f"{first} came first, {left_s:.1f} s are left"
+        if cause.early and left_s is not None and left_s > causes.early_s:
+            return cause.early, f"{first} came first, {left_s:.1f} s are left"
         return cause.actions, f"{first} came first"

@@ -8,15 +8,16 @@ import msgspec
 
 __all__ = ["CAUSES", "Cause", "Causes"]
 
-STEADY = ("step-suppression", "balance-lock")
+STEADY = ("step-suppression", "balance-lock", "compliance-tuning")
+ARMS = ("soften-arms", "withdraw-arm")
 
 
 class Cause(msgspec.Struct, frozen=True):
-    """What is done when one of these kinds came first, and what when the accident is nearer than urgent_s."""
+    """What is done when one of these kinds came first, and what suffices while the accident is farther than early_s."""
 
     kinds: tuple[str, ...]
     actions: tuple[str, ...]
-    urgent: tuple[str, ...] = ()
+    early: tuple[str, ...] = ()
 
 
 class Causes(msgspec.Struct, frozen=True):
@@ -26,14 +27,14 @@ class Causes(msgspec.Struct, frozen=True):
         causes: by first sign.
         predicted: actions where an accident is predicted before any precursor has come.
         after: actions while the level stands although all evidence has left the window.
-        urgent_s: with less time than this left, a cause's urgent actions replace its others.
+        early_s: with a predicted time of more than this, a cause's early actions are enough; no prediction is no time.
         mitigation: asked for as well while an accident is predicted; the arbiter takes it when nothing else helps.
     """
 
     causes: tuple[Cause, ...]
     predicted: tuple[str, ...]
     after: tuple[str, ...]
-    urgent_s: float = 0.0
+    early_s: float = 1.0
     mitigation: tuple[str, ...] = ()
 
 
@@ -42,35 +43,30 @@ CAUSES: Mapping[str, Causes] = {
         (
             # on a slippery floor, feedback and stiff legs push the feet away
             Cause(("foot-micro-slip",), ("step-suppression",)),
-            Cause(("com-lateral-deviation", "sway-amplitude-increase"), STEADY),
-            Cause(("torso-angular-spike",), (*STEADY, "compliance-tuning")),
+            Cause(("torso-angular-spike", "com-lateral-deviation", "sway-amplitude-increase"), STEADY),
         ),
-        predicted=(*STEADY, "compliance-tuning"),
+        predicted=STEADY,
         after=("step-suppression",),
         mitigation=("impact-mitigation",),
     ),
     "A2": Causes(
         (
-            Cause(
-                ("excessive-arm-velocity", "rapid-torso-recovery"), ("soften-arms",), ("soften-arms", "withdraw-arm")
-            ),
-            Cause(("human-proximity-breach",), ("soften-arms", "withdraw-arm")),
+            Cause(("excessive-arm-velocity", "rapid-torso-recovery"), ARMS, early=("soften-arms",)),
+            Cause(("human-proximity-breach",), ARMS),
         ),
-        predicted=("soften-arms", "withdraw-arm"),
+        predicted=ARMS,
         after=("soften-arms",),
-        urgent_s=1.0,
     ),
     "A3": Causes(
         (
             Cause(
                 ("swing-leg-drift", "path-overlap", "narrow-shared-space"),
-                ("shorten-step", "announce"),
                 ("step-suppression", "announce"),
+                early=("shorten-step", "announce"),
             ),
         ),
         predicted=("step-suppression", "announce"),
         after=("shorten-step", "announce"),
-        urgent_s=1.0,
     ),
 }
 """A1 by a map of subsets of the four protocols against the disturbances of the twin ``mujoco``, seeds from 50000."""
