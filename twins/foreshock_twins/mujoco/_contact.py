@@ -92,9 +92,10 @@ class HumanContacts:
         """
         deepest: dict[tuple[int, int], int] = {}
         contact = data.contact
-        if data.ncon:
+        excluded = contact.exclude  # from MuJoCo's solver: contacts with the human alone are
+        if excluded.any():
             pairs, depths = contact.geom, contact.dist
-            for k in np.flatnonzero(depths < 0.0).tolist():
+            for k in np.flatnonzero(excluded).tolist():
                 a, b = int(pairs[k, 0]), int(pairs[k, 1])
                 human = a if a in self._regions else b if b in self._regions else -1
                 if human >= 0:
@@ -106,7 +107,8 @@ class HumanContacts:
         for (human, other), k in deepest.items():
             touches.append(self._touch(model, data, human, other, k, velocities))
             pushed[human] = pushed.get(human, 0.0) + touches[-1].force
-        self._give_way({human for human, _ in deepest}, pushed, dt)
+        if deepest or self._given:
+            self._give_way({human for human, _ in deepest}, pushed, dt)
         return touches
 
     def _touch(self, model: Any, data: Any, human: int, other: int, k: int, velocities: Any) -> Touch:

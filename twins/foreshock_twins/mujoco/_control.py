@@ -261,7 +261,8 @@ class Controller:
             self._anchor()
         self._references.append((now_ns, gait.xi))
         out, drawn = self.strengths["arm-reconfiguration"], self.strengths["withdraw-arm"]
-        arms = self._p["arms_forward"] * self._arms_forward + out * self._arms_out + drawn * self._arms_in
+        forward = (1.0 - drawn) * self._p["arms_forward"]
+        arms = forward * self._arms_forward + out * self._arms_out + drawn * self._arms_in
         self._ik.q[self._body.pin_q] += arms - self._arms
         self._arms = arms
         feet = [gait.foot(k) for k in (0, 1)]

@@ -277,7 +277,7 @@ class Body:
             )
 
     def _hang_payloads(self, spec: Any, robot: RobotConfig) -> None:
-        """Bodies of no mass to speak of, which a payload gives its mass."""
+        """Bodies without mass, which a payload gives its mass."""
         places = [("torso", robot.torso), ("left_hand", robot.left_hand), ("right_hand", robot.right_hand)]
         self.payloads: dict[str, str] = {}
         for key, link in places:
@@ -286,7 +286,7 @@ class Body:
             body, placement = self._carrier(spec, self._frame(link, key))
             name = f"{key}-payload"
             child = body.add_body(name=name, pos=placement.translation)
-            child.mass, child.inertia, child.explicitinertial = 1e-6, [1e-9, 1e-9, 1e-9], True
+            child.mass, child.inertia, child.explicitinertial = 0.0, [0.0, 0.0, 0.0], True
             # a body that a sensor refers to is not fused with the one that carries it
             kind, body_type = mujoco.mjtSensor.mjSENS_FRAMEPOS, mujoco.mjtObj.mjOBJ_BODY
             spec.add_sensor(name=name, type=kind, objtype=body_type, objname=name)

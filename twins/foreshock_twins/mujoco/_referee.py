@@ -16,6 +16,8 @@ _TILT = 0.5
 """rad of the torso off the vertical; beyond, balance is lost."""
 _SUNK = 0.8
 """Share of the centre of mass's height; below, balance is lost."""
+_BEYOND_M = 0.15
+"""Capture point outside the rectangle about both soles; farther out no ankle and no hip brings it back."""
 _TOUCH_N = 1.0
 _TRANSIENT_S = 0.5
 """ISO/TS 15066: a longer contact is quasi-static."""
@@ -52,9 +54,19 @@ class Referee:
         """All so far, by time."""
         return sorted(self._events.values(), key=lambda e: (e.stamp_ns, e.id))
 
-    def balance(self, now_ns: int, tilt: float, com_z: float) -> None:
-        """Judge the posture: torso's angle to the vertical (rad), height of the centre of mass (m)."""
-        if tilt > _TILT or com_z < _SUNK * self._height:
+    def balance(self, now_ns: int, tilt: float, com_z: float, beyond: float) -> None:
+        """Judge the posture.
+
+        Args:
+            now_ns: when.
+            tilt: the torso's angle to the vertical (rad).
+            com_z: height of the centre of mass (m).
+            beyond: how far the capture point is outside the rectangle about both soles (m).
+        """
+        if beyond > _BEYOND_M:
+            self.lost = True
+            self._note(now_ns, "balance-lost", "", beyond, _BEYOND_M, "m")
+        elif tilt > _TILT or com_z < _SUNK * self._height:
             self.lost = True
             self._note(now_ns, "balance-lost", "", tilt, _TILT, "rad")
 
@@ -68,6 +80,9 @@ class Referee:
     def touches(self, now_ns: int, found: Sequence[Touch]) -> None:
         """Judge the contacts with the human at one step."""
         strong = [t for t in found if t.force > _TOUCH_N]
+        if not (strong or self._since):
+            self.force = 0.0
+            return
         self.force = max((t.force for t in strong), default=0.0)
         self.peak = max(self.peak, self.force)
         kinds = {(t.region, t.body in self._legs) for t in strong}
@@ -100,4 +115,4 @@ class Referee:
         if known is None:
             self._events[id_] = TwinEvent(now_ns, id_, mode, value, limit, unit)
         elif not math.isnan(value) and value / limit > known.value / known.limit:
-            self._events[id_] = msgspec.structs.replace(known, value=value, limit=limit)
+            self._events[id_] = msgspec.structs.replace(known, value=value, limit=limit, unit=unit)

@@ -14,14 +14,26 @@ __all__ = ["RobotConfig", "robot_files", "share_folder"]
 _TALOS = Path("example-robot-data/robots/talos_data")
 _TALOS_ARMS = {
     "arms_out": {"arm_left_2_joint": 0.8, "arm_right_2_joint": -0.8},
-    "arms_in": {"arm_left_4_joint": -0.7, "arm_right_4_joint": -0.7},
+    "arms_in": {
+        "arm_left_1_joint": 0.215,
+        "arm_left_2_joint": -0.123,
+        "arm_left_3_joint": -0.511,
+        "arm_right_1_joint": -0.215,
+        "arm_right_2_joint": 0.123,
+        "arm_right_3_joint": 0.511,
+    },
     "arms_forward": {
-        "arm_left_1_joint": 0.3,
-        "arm_left_4_joint": -0.2,
-        "arm_right_1_joint": -0.3,
-        "arm_right_4_joint": -0.2,
+        "arm_left_1_joint": -0.981,
+        "arm_left_2_joint": 0.233,
+        "arm_left_3_joint": 0.080,
+        "arm_left_4_joint": -0.560,
+        "arm_right_1_joint": 0.981,
+        "arm_right_2_joint": -0.233,
+        "arm_right_3_joint": -0.080,
+        "arm_right_4_joint": -0.560,
     },
 }
+"""From half_sitting: hands 0.44 m beside the middle go to 0.75 m; beside the thighs; 0.48 m ahead and 0.95 m high."""
 
 
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

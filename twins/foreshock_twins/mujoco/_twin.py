@@ -32,8 +32,8 @@ _KEPT = 256
 """Measurements that are kept: 1.28 s, more than any latency and lag together."""
 _SENSORS, _CAMERA = 1, 2
 _LOADED_N = 10.0
-_NEAR_M = 1.5
-"""A human farther than this from the base, beyond arms and fall, is looked for once a tick only."""
+_NEAR_M, _FALL_M = 1.0, 2.0
+"""A human farther than this from the base, beyond arms (and a fall), is not looked for at each step."""
 
 
 class Frame(msgspec.Struct, frozen=True):
@@ -207,13 +207,14 @@ class MujocoTwin:
             self._ready = False
             raise TwinError("nan", f"the physics has diverged at {now_ns / NS_PER_S:.3f} s")
         mujoco.mj_forward(model, data)
-        self._referee.balance(now_ns + PERIOD_NS, self._tilt(), float(data.subtree_com[body.base_id][2]))
+        com_z = float(data.subtree_com[body.base_id][2])
+        self._referee.balance(now_ns + PERIOD_NS, self._tilt(), com_z, self._beyond())
 
     def _physics(self, now_ns: int) -> None:
         """Step by step where contacts must be seen at each; else all at once."""
         model, data, people, referee = self.model, self._data, self._people, self._referee
         people.plan(now_ns + PERIOD_NS)
-        near = people.near(data.qpos[:2], _NEAR_M)
+        near = people.near(data.qpos[:2], _FALL_M if referee.lost else _NEAR_M)
         if not near and not referee.lost:
             people.go(1.0)
             mujoco.mj_step(model, data, _SUBSTEPS)
@@ -227,7 +228,8 @@ class MujocoTwin:
             if near:
                 referee.touches(at_ns, people.push(STEP_S))
             mujoco.mj_step2(model, data)
-            self._judge_floor(at_ns)
+            if referee.lost or k == _SUBSTEPS - 1:
+                self._judge_floor(at_ns)
         data.qfrc_applied[:] = 0.0
         if not near:
             referee.touches(now_ns + PERIOD_NS, ())
@@ -285,6 +287,19 @@ class MujocoTwin:
     def _com_rate(self) -> Any:
         mujoco.mj_subtreeVel(self.model, self._data)
         return self._data.subtree_linvel[self._body.base_id]
+
+    def _beyond(self) -> float:
+        """How far the capture point is outside the rectangle about both soles (m); below 0 inside."""
+        robot, data = self._body.robot, self._data
+        com, rate, omega = data.subtree_com[self._body.base_id], self._com_rate(), self._control.gait.omega
+        soles = [data.site_xpos[site] for site in self._sensors.sole_sites]
+        reach = (max(-robot.sole_x_min_m, robot.sole_x_max_m), robot.sole_y_half_m)
+        off = -math.inf
+        for i in (0, 1):
+            xi = float(com[i] + rate[i] / omega)
+            low, high = sorted(float(sole[i]) for sole in soles)
+            off = max(off, low - reach[i] - xi, xi - high - reach[i])
+        return off
 
     def _zmp(self) -> tuple[float, float]:
         """Centre of pressure of both soles on the ground; the last one while none is loaded."""
