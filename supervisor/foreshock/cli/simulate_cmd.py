@@ -36,7 +36,9 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
 
 @click.command()
 @click.argument("scenario")
-@click.option("--twin", help="Kind of twin, or KIND:ENDPOINT; the scenario's own by default.")
+@click.option(
+    "--twin", help="Kind of twin, or KIND:ENDPOINT; the scenario's variant on it if there is one; its own by default."
+)
 @click.option(
     "--supervisor",
     "arm",
@@ -77,9 +79,9 @@ def simulate(
     The run takes place in a watched process: an FMU that hangs or crashes ends in a message, not in this program.
     """
     registry = Registry()
-    found = find_scenario(scenario, registry).with_(parameters, policy)
+    kind, _, endpoint = (twin or "").partition(":")
+    found = find_scenario(scenario, registry, kind).with_(parameters, policy)
     if twin is not None and twin != found.twin["kind"]:
-        kind, _, endpoint = twin.partition(":")
         registry.twin(kind, "--twin")
         found = msgspec.structs.replace(found, twin={"kind": kind, **({"endpoint": endpoint} if endpoint else {})})
     if duration is not None:

@@ -6,6 +6,8 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 
+from msgspec.structs import replace
+
 from foreshock.clock import NS_PER_S, ns, seconds
 from foreshock.errors import ConfigError
 from foreshock.journal import DigestJournal, Journal
@@ -90,7 +92,7 @@ def simulate(
             else:
                 ignored.add(change.action)
         samples = twin.advance(now)
-        events = twin.events()
+        events = _events(scenario, twin)
         decision = None
         if judge is not None:
             decision = judge.step(samples, now, crashes.at(now))
@@ -108,7 +110,7 @@ def simulate(
         if progress is not None and now - told >= NS_PER_S // 4:
             told = now
             progress(seconds(now))
-    events = tuple(twin.events())
+    events = _events(scenario, twin)
     accidents = [e for e in events if e.mode == scenario.mode]
     outcome = accidents[0].id if accidents else events[0].id if events else "none"
     policies = "+".join(p.use for p in judge.config.policies) if judge is not None else ""
@@ -155,6 +157,14 @@ def warnings_of(supervisor: Supervisor, mode: str | None = None) -> tuple[str, .
     if not supervisor.config.policies:
         found.append("policies is empty: nothing intervenes before the minimal risk condition")
     return tuple(found)
+
+
+def _events(scenario: Scenario, twin: Twin) -> tuple[TwinEvent, ...]:
+    """What the referee saw; what the scenario counts as its accident belongs to its mode."""
+    events = tuple(twin.events())
+    if not scenario.accidents:
+        return events
+    return tuple(replace(e, mode=scenario.mode) if e.id in scenario.accidents and not e.mode else e for e in events)
 
 
 class _Log:
