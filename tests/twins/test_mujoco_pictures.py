@@ -186,6 +186,7 @@ def run_cli(tmp_path, backend):
     return json.loads(done.stdout)["result"]
 
 
+@pytest.mark.slow
 def test_the_command_draws_both_runs(opengl, tmp_path):
     result = run_cli(tmp_path, "")
     assert result["skipped"] == ""
