@@ -30,6 +30,7 @@ EXTRAS = {
     "proximity": ("fcl", "pinocchio"),
     "grip": ("filterpy",),
     "fmi": ("fmpy",),
+    "mujoco": ("mujoco", "pinocchio", "av", "PIL"),
     "zenoh": ("zenoh", "mcap", "rosbags"),
     "report": ("jinja2", "matplotlib"),
     "analysis": ("SALib", "sklearn", "statsmodels", "pyarrow"),

@@ -23,6 +23,7 @@ from foreshock.cli.gates_cmd import gates
 from foreshock.cli.journal_cmd import journal
 from foreshock.cli.operator_cmd import reset
 from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, TERMINATED, emit, notes
+from foreshock.cli.pictures_cmd import pictures
 from foreshock.cli.policies_cmd import policies
 from foreshock.cli.replay_cmd import replay
 from foreshock.cli.run_cmd import run
@@ -77,8 +78,8 @@ def cli() -> None:
 
 
 COMMANDS = (
-    calibrate, campaign, config, demo, detectors, doctor, events, falsify, gates, journal, policies, replay, reset, run,
-    scenarios, security, sensitivity, simulate, taxonomy, top, twin,
+    calibrate, campaign, config, demo, detectors, doctor, events, falsify, gates, journal, pictures, policies, replay,
+    reset, run, scenarios, security, sensitivity, simulate, taxonomy, top, twin,
 )  # fmt: skip
 for command in COMMANDS:
     cli.add_command(command)

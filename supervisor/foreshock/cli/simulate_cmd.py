@@ -18,20 +18,21 @@ from foreshock.session.isolated import Job, run_one
 from foreshock.session.run import Arm, Run
 from foreshock.session.scenario import find_scenario
 
-__all__ = ["simulate", "timeline"]
+__all__ = ["simulate", "summary", "timeline", "values"]
 
 
-def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, float]:
-    values = {}
+def values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, float]:
+    """NAME=NUMBER by name."""
+    found = {}
     for item in given:
         name, equals, number = item.partition("=")
         try:
-            values[name] = float(number)
+            found[name] = float(number)
         except ValueError:
             equals = ""
         if not equals:
             raise click.BadParameter(f"{item!r} is not NAME=NUMBER")
-    return values
+    return found
 
 
 @click.command()
@@ -50,7 +51,7 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
 @click.option("--policy", help="Use this policy instead of the scenario's.")
 @click.option("--seed", type=click.IntRange(0), help="Of all randomness; the scenario's own (0) by default.")
 @click.option(
-    "--set", "parameters", multiple=True, callback=_values, metavar="NAME=NUMBER", help="Set a parameter of the twin."
+    "--set", "parameters", multiple=True, callback=values, metavar="NAME=NUMBER", help="Set a parameter of the twin."
 )
 @click.option("--duration", type=float, help="Simulated time in s; the scenario's own by default.")
 @click.option(
