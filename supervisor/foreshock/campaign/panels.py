@@ -100,7 +100,7 @@ def pareto_panel(
     colours: Mapping[str, str],
     size: tuple[float, float],
 ) -> Panel | None:
-    """Accident rate against false interventions per hour, of the arms that decide and act, and of none.
+    """Accident rate against false interventions per hour, of the arms that act, and of none.
 
     Arms that ran in only some of the part's scenarios are left out; arms at one place are drawn side by side.
 
@@ -119,7 +119,7 @@ def pareto_panel(
         for r in results
         if r.accidents.n
         and r.scenarios == most
-        and (kinds[r.arm] == "none" or (kinds[r.arm] == "on" and r.false is not None and r.false.hours > 0.0))
+        and (kinds[r.arm] == "none" or (kinds[r.arm] != "shadow" and r.false is not None and r.false.hours > 0.0))
     ]
     if not known:
         return None
