@@ -54,7 +54,7 @@ class Change(msgspec.Struct, frozen=True):
 
 
 def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]]) -> list[Change]:
-    """Every metric of the arms that both campaigns have, overall, per mode and per fault.
+    """Every metric of the arms and scenarios that both campaigns have, overall, per mode and per fault.
 
     Runs of the same scenario, parameters, fault, seed and arm are compared one by one (McNemar; Wilcoxon's signed ranks
     for times); where the campaigns share none, as independent samples (Fisher's exact test; Mann and Whitney's).
@@ -66,10 +66,11 @@ def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]
     arms = {a.id: a for a in before[0].spec.arms}
     shared = [a for a in after[0].spec.arms if a.id in arms]
     sides = [Outcomes(*before), Outcomes(*after)]
-    tables = [before[1], after[1]]
+    both = {r.scenario for r in before[1]} & {r.scenario for r in after[1]}
+    tables = [[r for r in rows if r.scenario in both] for _, rows in (before, after)]
     found: list[Change] = []
     scopes = [
-        s for s in scopes_of([*before[1], *after[1]]) if s[0].kind in ("overall", "mode", "fault") and s[0] != WITHOUT
+        s for s in scopes_of([*tables[0], *tables[1]]) if s[0].kind in ("overall", "mode", "fault") and s[0] != WITHOUT
     ]
     several = sum(scope.kind == "mode" for scope, _ in scopes) > 1
     for scope, belongs in scopes if several else scopes[1:]:  # one mode is the whole

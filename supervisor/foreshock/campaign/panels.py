@@ -214,8 +214,7 @@ def _reliability(
         for b in result.reliability:
             x, y = frame.x(b.mean), frame.y(b.rate.k / b.rate.n)
             shift = 3.0 * (k - (len(arms) - 1) / 2.0)  # two models' bars beside each other
-            inside = (r for r in told[result.arm] if b.low <= (r.peak_p or 0.0) < b.high or b.high == 1.0)
-            key = next(r.key for r in sorted(inside, key=lambda r: abs((r.peak_p or 0.0) - b.mean)))
+            key = min(told[result.arm], key=lambda r, b=b: abs((r.peak_p or 0.0) - b.mean)).key  # type: ignore[misc]  # b is bound here
             bar = (x + shift, frame.y(b.rate.low), x + shift, frame.y(b.rate.high))
             text = f"{result.arm}: P in {b.low:.1f}–{b.high:.1f}, mean {b.mean:.3f}: accidents {b.rate}"
             label = (str(b.rate.n), 12.0 * k)

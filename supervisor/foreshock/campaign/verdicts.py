@@ -120,9 +120,9 @@ def fault_table(effects: Sequence[FaultEffect]) -> str:
     for e in effects:
         where = "; ".join(f"`{scenario}` {rate.k}/{rate.n}" for scenario, rate in e.where.items()) or "–"
         shown = ", ".join(f"**{x}**" if x == "more accidents" else x for x in e.effects)
-        cells = (e.fault, f"`{e.arm}`", e.accidents, f"{e.accidents_without.k}/{e.accidents_without.n}", where)
-        cells = (*cells, e.false, f"{e.false_without.k}/{e.false_without.n}", e.minimal_risk, e.failures, shown)
-        lines.append(f"| {' | '.join(str(c) for c in cells)} |")
+        cells = [e.fault, f"`{e.arm}`", str(e.accidents), f"{e.accidents_without.k}/{e.accidents_without.n}", where]
+        cells += [str(e.false), f"{e.false_without.k}/{e.false_without.n}", str(e.minimal_risk), str(e.failures), shown]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

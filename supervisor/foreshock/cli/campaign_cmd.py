@@ -154,7 +154,7 @@ def compare(first: Path, second: Path, as_json: bool) -> int:
             notes.print(f"{side.folder}: {len(found)} of {len(side.plan.cases)} runs are there", markup=False)
     changes = compare_campaigns(*((c.plan, r) for c, r in zip(sides, rows, strict=True)))
     if not changes:
-        raise BadInputError(str(second), f"has no arm and part with runs in common with {first}")
+        raise BadInputError(str(second), f"has no arm and scenario with runs in common with {first}")
     if missing := {a.id for a in sides[0].plan.spec.arms} - {c.arm for c in changes}:
         notes.print(f"not compared, since only one of them has it: arm {', '.join(sorted(missing))}", markup=False)
     if as_json:
