@@ -164,12 +164,12 @@ def test_a_bad_robot_is_named(robot: dict[str, object], words: str) -> None:
 
 
 def test_bad_sizes_and_strengths_are_refused(twin: MujocoTwin) -> None:
-    with pytest.raises(ConfigError, match="sole_x_min_m: 0.2 is not below"):
+    with pytest.raises(ConfigError, match=r"sole_x_min_m: 0\.2 is not below"):
         RobotConfig(sole_x_min_m=0.2)
     with pytest.raises(ConfigError, match="record_hz"):
         MujocoTwinConfig(record_hz=-1.0)
     twin.reset({}, 0)
-    with pytest.raises(BadInputError, match="strength is 1.5"):
+    with pytest.raises(BadInputError, match=r"strength is 1\.5"):
         twin.intervene(Intervention(0, "hold", 1.5))
     twin.intervene(Intervention(0, "regrasp", 1.0))  # not its own: ignored
 

@@ -154,6 +154,7 @@ class Controller:
         self._plan_acceleration: Floats = np.zeros(body.pin_model.nv)
         self._torque = self._ik.torques(self._plan_rate, self._plan_acceleration, (0.5, 0.5))[body.pin_v]
         self._released_s = self._length_m = 0.0
+        self._jumps = 0
         self._stiffness, self._damping = body.stiffness.copy(), body.damping.copy()
         self.target = q + self._torque / self._stiffness
         self.soles: list[tuple[float, float, float, float]] = [(f.x, f.y, 0.0, 0.0) for f in feet]
@@ -249,6 +250,7 @@ class Controller:
             asked = max(self.asked["step-suppression"], self.asked["minimal-risk"])
             place, rate = f.into(float(c[0]), float(c[1])), f.vector_into(float(v[0]), float(v[1]))
             gait.suppress(asked, _LANDING_S, place, rate)
+            self._jumps = 2
         elif gait.settling:
             self._released_s = self._released_s + self._dt if suppressed == 0.0 and gait.settled() else 0.0
             if self._released_s >= _RESUME_S:
@@ -275,6 +277,10 @@ class Controller:
 
     def _feed_forward(self, v: Floats) -> None:
         """Torques that the plan needs; the targets lead the plan by so much that the servos give them."""
+        if self._jumps:  # the plan starts anew from where the robot is, and with its speed: no motion to give torques for
+            self._jumps -= 1
+            self._plan_rate = v
+            return
         a = (v - self._plan_rate) / self._dt
         self._plan_rate = v
         weight = self._dt / (self._dt + _FORWARD_FILTER_S)
