@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
-mujoco = pytest.importorskip("mujoco")
-pin = pytest.importorskip("pinocchio")
+pytest.importorskip("mujoco")
+pytest.importorskip("pinocchio")
 
+import mujoco
+import pinocchio as pin
 from mujoco_runs import TICK_NS, new_twin
 
 from foreshock.messages import Imu, JointState, Odometry, WrenchStamped

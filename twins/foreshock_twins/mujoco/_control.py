@@ -277,7 +277,7 @@ class Controller:
 
     def _feed_forward(self, v: Floats) -> None:
         """Torques that the plan needs; the targets lead the plan by so much that the servos give them."""
-        if self._jumps:  # the plan starts anew from where the robot is, and with its speed: no motion to give torques for
+        if self._jumps:  # the plan starts anew from where the robot is: no motion to give torques for
             self._jumps -= 1
             self._plan_rate = v
             return

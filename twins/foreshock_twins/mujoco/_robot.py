@@ -33,7 +33,7 @@ _TALOS_ARMS = {
         "arm_right_4_joint": -0.560,
     },
 }
-"""From half_sitting: hands out as far as the shoulders can hold them; beside the thighs; 0.48 m ahead and 0.95 m high."""
+"""From half_sitting: hands out as far as the shoulders hold them; beside the thighs; 0.48 m ahead and 0.95 m high."""
 
 
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
