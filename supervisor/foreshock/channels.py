@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
+from foreshock.clock import ns
 from foreshock.detector import Input
-from foreshock.messages import is_finite
+from foreshock.messages import is_finite, stands_still
 from foreshock.records import Sample
 
 __all__ = ["AHEAD_NS", "ChannelView", "unread"]
@@ -70,19 +71,23 @@ def unread(sample: object) -> tuple[str, str]:
 
 
 class ChannelView:
-    """Newest valid sample of a channel, whether one was malformed, and its arrivals within a second.
+    """Newest valid sample of a channel, whether one was malformed or all are frozen, and its arrivals within a second.
 
     Args:
         needs: the inputs that read this channel.
         queues: where each of them waits for new samples.
     """
 
-    __slots__ = ("_queues", "_rated", "_type", "_types", "arrivals", "fault", "fault_ns", "latest")
+    __slots__ = (
+        "_longest_ns", "_moved_ns", "_queues", "_rated", "_type", "_types", "arrivals", "fault", "fault_ns", "latest",
+        "still_ns",
+    )  # fmt: skip
 
     def __init__(self, needs: Sequence[Input], queues: Sequence[list[Sample]]) -> None:
         self._types = tuple({need.type: None for need in needs})
         self._type = self._types[0] if len(self._types) == 1 else None
         self._rated = any(need.min_rate_hz > 0 for need in needs)
+        self._longest_ns = min([ns(need.max_standstill_s) for need in needs if need.max_standstill_s > 0.0], default=0)
         self._queues = tuple(queues)
         self.reset()
 
@@ -91,6 +96,8 @@ class ChannelView:
         self.latest: Sample | None = None
         self.fault = ""
         self.fault_ns = -1
+        self._moved_ns = 0
+        self.still_ns = 0
         self.arrivals: deque[int] = deque()
 
     def take(self, sample: Sample, now_ns: int) -> bool:
@@ -106,8 +113,14 @@ class ChannelView:
             return False
         if self.fault and self.fault_ns < now_ns:
             self.fault = ""
-        if self.latest is None or stamp_ns >= self.latest.stamp_ns:
+        before = self.latest
+        if before is None or stamp_ns >= before.stamp_ns:
             self.latest = sample
+            if self._longest_ns:
+                if before is not None and stands_still(before.value, value):
+                    self.still_ns = stamp_ns - self._moved_ns
+                else:
+                    self._moved_ns, self.still_ns = stamp_ns, 0
         if self._rated:
             self.arrivals.append(now_ns)
         for queue in self._queues:
@@ -126,7 +139,15 @@ class ChannelView:
             return f"{sample.channel} is stamped {(sample.stamp_ns - now_ns) / 1e6:.0f} ms ahead of the supervisor"
         return ""
 
-    def lacks(self, need: Input, max_age_ns: int, now_ns: int, since_ns: int) -> str:
+    def frozen(self, max_standstill_ns: int = 0) -> str:
+        """Why the channel is frozen: the same values for longer than this, or than its strictest reader allows."""
+        allowed = max_standstill_ns or self._longest_ns
+        if self.latest is None or self.still_ns <= allowed:
+            return ""
+        lasts = f"the same values for {self.still_ns / 1e6:.0f} ms, at most {allowed / 1e6:.0f} ms is allowed"
+        return f"{self.latest.channel} is frozen: {lasts}"
+
+    def lacks(self, need: Input, max_age_ns: int, max_standstill_ns: int, now_ns: int, since_ns: int) -> str:
         """Why the channel does not serve this input now; empty if it does."""
         if self.fault:
             return self.fault
@@ -135,6 +156,8 @@ class ChannelView:
         age = now_ns - self.latest.stamp_ns
         if age > max_age_ns:
             return f"{need.channel} is {age / 1e6:.0f} ms old, at most {need.max_age_s * 1e3:.0f} ms is allowed"
+        if 0 < max_standstill_ns < self.still_ns:
+            return self.frozen(max_standstill_ns)
         if need.min_rate_hz > 0.0 and now_ns - since_ns >= 1_000_000_000:
             while self.arrivals and self.arrivals[0] <= now_ns - 1_000_000_000:
                 self.arrivals.popleft()

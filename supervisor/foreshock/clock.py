@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import time
 
-__all__ = ["NS_PER_S", "cpu_ns", "monotonic_ns", "ns", "seconds", "sleep_until", "today", "wall_ns"]
+__all__ = ["NS_PER_S", "cpu_ns", "monotonic_ns", "ns", "seconds", "sleep_until", "thread_cpu_ns", "today", "wall_ns"]
 
 NS_PER_S = 1_000_000_000
 
@@ -40,6 +40,11 @@ def sleep_until(monotonic: int) -> None:
 def cpu_ns() -> int:
     """CPU time of this process in nanoseconds."""
     return time.process_time_ns()
+
+
+def thread_cpu_ns() -> int:
+    """CPU time of this thread in nanoseconds."""
+    return time.thread_time_ns()
 
 
 def today() -> str:

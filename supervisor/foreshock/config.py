@@ -57,12 +57,15 @@ class DetectorEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         isolation: where it runs; its own choice if not given.
         channels: channel per input name, where it differs from the detector's default.
         config: its settings.
+        standstill_s: longest standstill per input name (s), where it differs from the detector's default; 0 does not
+            check, for a sensor that is ideal, or coarser than its noise.
     """
 
     use: str
     isolation: Isolation | None = None
     channels: dict[str, str] = {}
     config: dict[str, Any] = {}
+    standstill_s: dict[str, float] = {}
 
 
 class PolicyEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

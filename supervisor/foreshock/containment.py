@@ -110,11 +110,12 @@ class Contained:
         self._max_failures = max_failures
         times = {"period_s": spec.period_s, "warm_up_s": spec.warm_up_s}
         times |= {f"inputs.{i.name}.max_age_s": i.max_age_s for i in self.inputs}
+        times |= {f"inputs.{i.name}.max_standstill_s": i.max_standstill_s for i in self.inputs}
         times |= {f"inputs.{i.name}.min_rate_hz": i.min_rate_hz for i in self.inputs}
         for name, value in times.items():
             within(f"detector {spec.id}: {name}", value, 0.0)
         self._period_ns, self._warm_up_ns = ns(spec.period_s), ns(spec.warm_up_s)
-        self._needs = tuple((i, ns(i.max_age_s)) for i in self.inputs if i.channel != "*")
+        self._needs = tuple((i, ns(i.max_age_s), ns(i.max_standstill_s)) for i in self.inputs if i.channel != "*")
         self.pending: dict[str, list[Sample]] = {i.name: [] for i in self.inputs}
         self._failed_ns: tuple[int, ...] = ()
         self._start(0, 0)
@@ -158,15 +159,17 @@ class Contained:
             self._drop()
             return self._judged(verdict, now_ns)
         latest: dict[str, Sample] = {}
-        for need, max_age_ns in self._needs:
+        for need, max_age_ns, max_standstill_ns in self._needs:
             view = channels[need.channel]
-            reason = view.lacks(need, max_age_ns, now_ns, self._began_ns)
+            reason = view.lacks(need, max_age_ns, max_standstill_ns, now_ns, self._began_ns)
             if not reason:
                 assert view.latest is not None  # noqa: S101 # lacks() says so
                 latest[need.name] = view.latest
             elif need.required:
                 self._drop()
                 return Outcome("unobserved", reason)
+            elif 0 < max_standstill_ns < view.still_ns:
+                self.pending[need.name].clear()  # unlike one that is silent, a frozen stream goes on to arrive
         if now_ns < self._due_ns:
             return NOT_DUE
         self._due_ns = now_ns + self._period_ns

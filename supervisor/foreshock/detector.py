@@ -29,6 +29,8 @@ class Input(msgspec.Struct, frozen=True):
         max_age_s: older than this, counted from its source stamp, it is stale.
         min_rate_hz: slower than this, counted over one second, it is late; 0 does not check.
         required: if stale, the whole detector is unobserved; an optional input is left out of Inputs.latest instead.
+        max_standstill_s: if its values stay the same to the last bit for longer, counted in source stamps, it is
+            frozen, which counts as stale; 0 does not check. For what is measured with noise, not for commands.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Input(msgspec.Struct, frozen=True):
     max_age_s: float = 0.1
     min_rate_hz: float = 0.0
     required: bool = True
+    max_standstill_s: float = 0.0
 
 
 class Inputs(msgspec.Struct, frozen=True):

@@ -10,6 +10,7 @@ __all__ = [
     "ConfigError",
     "ForeshockError",
     "MissingExtraError",
+    "NoOpenGLError",
     "PluginError",
     "TwinError",
     "WireError",
@@ -63,6 +64,15 @@ class MissingExtraError(BadInputError):
 
 class WireError(BadInputError):
     """A payload, an attachment or a key that came over the wire is not what its type or key says."""
+
+
+class NoOpenGLError(ForeshockError):
+    """Pictures cannot be drawn here; what each OpenGL backend said. Who only wants pictures too goes on without."""
+
+    def __str__(self) -> str:
+        return (
+            f"no pictures: no OpenGL is to be had here ({self.args[0]}); MUJOCO_GL names a backend: egl, osmesa, glfw"
+        )
 
 
 class TwinError(ForeshockError):

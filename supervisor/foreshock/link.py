@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,7 +30,6 @@ __all__ = [
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 OWN = ("lease", "intervention", "decision")
 """Services that only the supervisor writes."""
-LOOPBACK = ("127.", "localhost", "[::1]", "::1")
 
 
 class TlsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -61,11 +61,13 @@ class AccessRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         name: common name of its certificate.
         write: key expressions that it may put to, and declare tokens on.
         ask: key expressions that it may query.
+        answer: key expressions on which it may answer queries.
     """
 
     name: str
     write: tuple[str, ...] = ()
     ask: tuple[str, ...] = ()
+    answer: tuple[str, ...] = ()
 
 
 class LinkSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -105,13 +107,23 @@ class LinkSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 protocol, _, address = endpoint.partition("/")
                 if protocol not in ("tcp", "tls") or not address:
                     raise ConfigError(f"link.{name}", f"{endpoint!r} is no endpoint", "; e.g. 'tcp/127.0.0.1:7447'")
-                if not self.remote and not address.startswith(LOOPBACK):
+                if not self.remote and not _is_loopback(address):
                     hint = "; set link.remote = true if this is meant, and certificates under [link.tls]"
                     raise ConfigError(f"link.{name}", f"{endpoint!r} is beyond this machine", hint)
+                hint = "; a tls/ endpoint needs ca, certificate and key, another one takes none"
                 if (protocol == "tls") != bool(self.tls.ca):
-                    raise ConfigError(f"link.{name}", f"{endpoint!r} and [link.tls] do not go together")
+                    raise ConfigError(f"link.{name}", f"{endpoint!r} and [link.tls] do not go together", hint)
         if self.access and not self.tls.ca:
             raise ConfigError("link.access", "needs certificates under [link.tls]: names come from there")
+
+
+def _is_loopback(address: str) -> bool:
+    """Whether ``host:port`` is of this machine alone; a name that only begins like its address is not."""
+    host = address.rpartition(":")[0].strip("[]")
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def keys_of(link: LinkSettings, robot: str) -> Keys:
@@ -142,7 +154,8 @@ def open_link(link: LinkSettings, base: Path | None = None) -> zenoh.Session:
         return zenoh.open(config)
     except zenoh.ZError as e:
         where = ", ".join((*link.listen, *link.connect))
-        raise BadInputError("link", f"cannot be opened on {where}: {e}") from None
+        why = str(e).partition(" at /")[0]  # what follows is a place in Zenoh's sources
+        raise BadInputError("link", f"cannot be opened on {where}: {why}") from None
 
 
 def ros_tokens(session: Any, keys: Keys, kind: Literal["MP", "MS"], channels: Mapping[str, str]) -> list[Any]:
@@ -175,6 +188,9 @@ def _options(link: LinkSettings, base: Path) -> dict[str, Any]:
         "transport/link/tx/lease": round(link.lease_s * 1000),
         "transport/link/rx/max_message_size": 4_194_304,
     }
+    if link.mode == "router":
+        # a long answer waits no longer (us) for a peer that takes nothing
+        options["transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments"] = 5_000
     if link.mode == "peer":
         options["connect/exit_on_failure"] = False
         options["connect/timeout_ms"] = -1
@@ -202,15 +218,16 @@ def _file(base: Path, place: str, name: str) -> str:
 
 
 def _access(rules: tuple[AccessRule, ...]) -> dict[str, Any]:
-    """Zenoh's access control: denied by default; everybody may read; writing and asking by name."""
-    reading = ["declare_subscriber", "liveliness_query", "declare_liveliness_subscriber", "reply", "declare_queryable"]
+    """Zenoh's access control: denied by default; everybody may read; writing, asking and answering by name."""
+    reading = ["declare_subscriber", "liveliness_query", "declare_liveliness_subscriber", "reply"]
+    everything = ["**", "foreshock/*/@/**", "@ros2_lv/**"]  # no wildcard meets a chunk that begins with @
     # a denial outweighs any permission; the supervisor's own session does not come in over a link
-    own = {**_rule("own", ["put", "delete"], [f"foreshock/*/_/{s}" for s in OWN], ["ingress"]), "permission": "deny"}
+    own = {**_rule("own", ["put", "delete"], [f"foreshock/*/@/{s}" for s in OWN], ["ingress"]), "permission": "deny"}
     out: list[dict[str, Any]] = [
         own,
-        _rule("read", reading, ["**"], ["ingress", "egress"]),
+        _rule("read", reading, everything, ["ingress", "egress"]),
         # what may come in may go on to everybody: the check is where it enters
-        _rule("deliver", ["put", "delete", "query", "liveliness_token"], ["**"], ["egress"]),
+        _rule("deliver", ["put", "delete", "query", "liveliness_token", "declare_queryable"], everything, ["egress"]),
     ]
     subjects, policies = [], []
     for k, rule in enumerate(rules):
@@ -221,6 +238,9 @@ def _access(rules: tuple[AccessRule, ...]) -> dict[str, Any]:
         if rule.ask:
             out.append(_rule(f"ask-{k}", ["query"], list(rule.ask), ["ingress"]))
             mine.append(f"ask-{k}")
+        if rule.answer:
+            out.append(_rule(f"answer-{k}", ["declare_queryable"], list(rule.answer), ["ingress"]))
+            mine.append(f"answer-{k}")
         subjects.append({"id": f"subject-{k}", "cert_common_names": [rule.name]})
         policies.append({"rules": mine, "subjects": [f"subject-{k}"]})
     return {

@@ -34,6 +34,7 @@ __all__ = [
     "Vec3",
     "WrenchStamped",
     "is_finite",
+    "stands_still",
 ]
 
 Vec3: TypeAlias = tuple[float, float, float]
@@ -281,3 +282,19 @@ def is_finite(message: Message) -> bool:
         return math.isfinite(_TOTAL[type(message)](message))
     except (TypeError, ValueError, KeyError):
         return False
+
+
+def stands_still(before: Message, after: Message) -> bool:
+    """Whether a message measures, to the last bit, what the one before it on its channel did.
+
+    That nobody is there, or nothing detected, is no measurement and never stands still. Of a heartbeat only the
+    sequence number counts. What cannot be compared (an array in place of a tuple) shows no motion: it stands still.
+    """
+    try:
+        if before == after:
+            return not (
+                (type(after) is Humans and not after.humans) or (type(after) is Detections and not after.detections)
+            )
+    except ValueError:
+        return True
+    return type(before) is type(after) is Heartbeat and before.sequence == after.sequence

@@ -157,6 +157,8 @@ class Pipeline:
         for channel, view in self.channels.items():
             if view.fault:
                 health[channel] = ("failed", view.fault)
+            elif view.still_ns and (frozen := view.frozen()):
+                health[channel] = ("stale", frozen)
         for source, fault in malformed.items():
             health[source] = ("failed", fault)
         unobserved = cov.unobserved(heard, state.spoken)

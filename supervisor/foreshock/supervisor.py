@@ -251,14 +251,21 @@ def contain(spec: DetectorSpec, entry: DetectorEntry, place: str, robot: str, ta
     settings = convert(entry.config, spec.config, f"{place}.config")
     inputs = inputs_of(spec, settings)
     names = {i.name for i in inputs}
-    for name in entry.channels:
-        if name not in names:
-            where = f"{place}.channels.{name}"
-            raise ConfigError(where, f"detector {spec.id!r} has no such input", nearest(name, names))
+    for setting, given in (("channels", entry.channels), ("standstill_s", entry.standstill_s)):
+        for name in given:
+            if name not in names:
+                where = f"{place}.{setting}.{name}"
+                raise ConfigError(where, f"detector {spec.id!r} has no such input", nearest(name, names))
+    for name, value in entry.standstill_s.items():
+        within(f"{place}.standstill_s.{name}", value, 0.0)
     bound = [
         i
         if i.channel == "*"
-        else msgspec.structs.replace(i, channel=f"{robot}/{entry.channels.get(i.name, i.channel)}")
+        else msgspec.structs.replace(
+            i,
+            channel=f"{robot}/{entry.channels.get(i.name, i.channel)}",
+            max_standstill_s=entry.standstill_s.get(i.name, i.max_standstill_s),
+        )
         for i in inputs
     ]
     told = msgspec.structs.replace(spec, kinds=kinds_of(spec, settings, place))

@@ -41,7 +41,10 @@ class PrecursorClass(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class AccidentMode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An accident mode: code, id, title, n and percent of the 126 events (Table 1), ordered cascade (Table 3)."""
+    """An accident mode: code, id, title, n and percent of the 126 events (Table 1), ordered cascade (Table 3).
+
+    hazard is what stands behind it in the words of ISO 12100 and the clauses of ISO 13482.
+    """
 
     code: str
     id: str
@@ -49,6 +52,7 @@ class AccidentMode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     n: int
     percent: float
     cascade: tuple[str, ...]
+    hazard: str
     source: str
 
 

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import msgspec
 
 from foreshock.records import Intervention, Sample
 
-__all__ = ["Channel", "Parameters", "Twin", "TwinBuilder", "TwinEvent", "TwinSpec"]
+__all__ = [
+    "Caption",
+    "Channel",
+    "Parameters",
+    "Pictures",
+    "Recorder",
+    "Take",
+    "Twin",
+    "TwinBuilder",
+    "TwinEvent",
+    "TwinSpec",
+]
 
 Parameters: TypeAlias = Mapping[str, float]
 
@@ -93,6 +104,60 @@ class TwinBuilder(Protocol):
         ...
 
 
+@runtime_checkable
+class Recorder(Protocol):
+    """What a twin offers besides, if pictures can be made of its runs: it keeps what moved."""
+
+    def record(self, rate_hz: float) -> None:
+        """Keep what moved at about this rate, from the next reset on; 0 keeps nothing."""
+
+    def save(self, path: Path) -> None:
+        """Write what was kept since the reset into a file for the pictures of its kind of twin."""
+
+
+class Caption(msgspec.Struct, frozen=True):
+    """What is known of a run from a time on, to be written above its picture.
+
+    Attributes:
+        t_s: from when.
+        text: short: a protection level and what is done.
+        trust: T, 0..1; None where nobody judges.
+        alarm: what has happened, e.g. ``fall``; empty if nothing has.
+    """
+
+    t_s: float
+    text: str = ""
+    trust: float | None = None
+    alarm: str = ""
+
+
+class Take(msgspec.Struct, frozen=True):
+    """A run to be shown.
+
+    Attributes:
+        title: above the picture.
+        recording: the file that its twin saved.
+        captions: by time.
+    """
+
+    title: str
+    recording: Path
+    captions: tuple[Caption, ...] = ()
+
+
+class Pictures(Protocol):
+    """Shows runs side by side."""
+
+    def __call__(self, config: Any, takes: Sequence[Take], times_s: Sequence[float], files: Sequence[Path]) -> None:
+        """Write files: ``.mp4`` or ``.gif`` is a film of all of it in real time, ``.png`` stills at these times.
+
+        Raises:
+            MissingExtraError: a package is not installed.
+            NoOpenGLError: nothing can be drawn on this machine.
+        """
+        ...
+
+
 class TwinSpec(msgspec.Struct, frozen=True):
     """A kind of twin that a plugin offers.
 
@@ -103,6 +168,7 @@ class TwinSpec(msgspec.Struct, frozen=True):
         summary: one line for people.
         files: the files that a twin of this configuration consists of, by role: its FMU, its binding. A campaign knows
             by their content whether it is still the same twin. None if the kind has none, or cannot say.
+        pictures: draws what twins of this kind have saved, see Recorder; None if the kind has no pictures.
     """
 
     id: str
@@ -110,3 +176,4 @@ class TwinSpec(msgspec.Struct, frozen=True):
     config: type[msgspec.Struct]
     summary: str = ""
     files: Callable[[Any], Mapping[str, Path]] | None = None
+    pictures: Pictures | None = None

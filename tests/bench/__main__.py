@@ -1,4 +1,4 @@
-"""``make bench``: prints the table and writes bench.json."""
+"""``make bench``: prints the table and writes bench.json; ``python -m tests.bench NAME...`` does only these parts."""
 
 from __future__ import annotations
 
@@ -10,16 +10,22 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from tests.bench import core, fmu_step, live, tick
+from tests.bench import campaign, core, fmu_step, live, tick
 from tests.bench.rows import Row
 
 OUT = Path("bench.json")
+PARTS = {part.__name__.rpartition(".")[2]: part for part in (tick, core, fmu_step, live, campaign)}
 
 
 def main() -> int:
-    """Run every benchmark."""
+    """Run every benchmark, or those that are named."""
+    names = sys.argv[1:] or list(PARTS)
+    if unknown := sorted(set(names) - PARTS.keys()):
+        sys.exit(f"no part {unknown[0]!r}; expected one of {', '.join(PARTS)}")
     rows: list[Row] = []
-    for part in track((tick, core, fmu_step, live), description="bench", console=Console(stderr=True), transient=True):
+    for part in track(
+        [PARTS[name] for name in names], description="bench", console=Console(stderr=True), transient=True
+    ):
         rows += part.rows()
     table = Table(
         title="Foreshock benchmarks (us: CPU time; ms: wall clock; reference measured in the same run)",

@@ -6,6 +6,8 @@ import shutil
 import statistics
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +20,14 @@ from foreshock.session.scenario import find_scenario
 from foreshock_fmus import build_fmu
 from tests.bench.rows import Row
 
-__all__ = ["rows"]
+__all__ = ["bare_slave", "rows"]
 
 STEPS, STEP_S = 2000, 0.005
 
 
-def bare_us() -> float:
-    """CPU time of doStep and one getFloat64 of all outputs, by FMPy's own slave class."""
+@contextmanager
+def bare_slave() -> Iterator[tuple[Any, list[int]]]:
+    """FMPy's own slave of the balance plant, instantiated, and the value references of its outputs."""
     path = str(build_fmu("balance", 3))
     description = fmpy.read_model_description(path)
     outputs = [v.valueReference for v in description.modelVariables if v.causality == "output"]
@@ -36,17 +39,22 @@ def bare_us() -> float:
         instanceName="bare",
     )
     slave.instantiate()
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
-    begin = time.process_time_ns()
-    for k in range(STEPS):
-        slave.doStep(k * STEP_S, STEP_S)
-        slave.getFloat64(outputs)
-    spent = (time.process_time_ns() - begin) / STEPS / 1e3
+    yield slave, outputs
     slave.terminate()
     slave.freeInstance()
     shutil.rmtree(folder)
-    return spent
+
+
+def bare_us() -> float:
+    """CPU time of doStep and one getFloat64 of all outputs."""
+    with bare_slave() as (slave, outputs):
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        begin = time.process_time_ns()
+        for k in range(STEPS):
+            slave.doStep(k * STEP_S, STEP_S)
+            slave.getFloat64(outputs)
+        return (time.process_time_ns() - begin) / STEPS / 1e3
 
 
 def twin_us() -> float:

@@ -22,6 +22,7 @@ KNOWN = {"python", "sh", "toml", "text", "c", "json", ""}
 FILES = {
     "bind-an-fmu.md": {"[binding]": ["my-binding.toml"], 'id = "my-slip"': ["my-scenario.toml"]},
     "campaigns.md": {'id = "my-campaign"': ["my-campaign.toml"]},
+    "whole-body.md": {'id = "beside-a-human"': ["beside-a-human.toml"]},
     "README.md": {"[supervisor]": ["robot.toml"]},
 }
 """What a page tells its reader to save, by page and first line of the block."""

@@ -25,7 +25,7 @@ NOW_S = time.time()
 def run(folder: Path, settings: JournalSettings, seconds: float, now_s: float) -> list[Path]:
     """A run of so many seconds into the folder at this time; the files there."""
     supervisor = Supervisor(parse_config(CONFIG, "config"))
-    journal = SegmentedJournal(folder, "r-1", Head(CONFIG, "", 0, 0), settings, now_s)
+    journal = SegmentedJournal(folder, "r", 1, Head(CONFIG, "", 0, 0), settings, now_s)
     supervisor.reset(0)
     for k in range(1, round(seconds * 10) + 1):
         now_ns = k * 100_000_000
@@ -53,14 +53,19 @@ def test_a_new_file_begins_in_time_and_only_the_first_is_compared(tmp_path: Path
 
 
 def test_the_oldest_are_removed_by_age_and_by_size(tmp_path: Path) -> None:
-    for k, age_days in enumerate((40.0, 20.0, 1.0)):
-        old = tmp_path / f"old-{k}.mcap"
+    others = [tmp_path / "bag.mcap", tmp_path / "r-arm-1-00000.mcap", tmp_path / "r-notes.mcap"]
+    for other in others:
+        other.write_bytes(bytes(400_000))
+        os.utime(other, (NOW_S - 50 * 86400.0,) * 2)
+    for k, age_days in enumerate((40.0, 20.0, 1.0), 2):
+        old = tmp_path / f"r-{k}-00000.mcap"
         old.write_bytes(bytes(400_000))
         os.utime(old, (NOW_S - age_days * 86400.0,) * 2)
     left = run(tmp_path, JournalSettings(max_age_s=30 * 86400.0, max_bytes=1_000_000), 1.0, NOW_S)
-    assert [f.name for f in left] == ["old-1.mcap", "old-2.mcap", "r-1-00000.mcap"]
-    (tmp_path / "old-3.mcap").write_bytes(bytes(400_000))
-    os.utime(tmp_path / "old-3.mcap", (NOW_S, NOW_S))
+    assert [f.name for f in left if f not in others] == ["r-1-00000.mcap", "r-3-00000.mcap", "r-4-00000.mcap"]
+    (tmp_path / "r-5-00000.mcap").write_bytes(bytes(400_000))
+    os.utime(tmp_path / "r-5-00000.mcap", (NOW_S, NOW_S))
     (tmp_path / "r-1-00000.mcap").unlink()
     left = run(tmp_path, JournalSettings(max_bytes=1_000_000), 1.0, NOW_S)
-    assert [f.name for f in left] == ["old-2.mcap", "old-3.mcap", "r-1-00000.mcap"]
+    assert [f.name for f in left if f not in others] == ["r-1-00000.mcap", "r-4-00000.mcap", "r-5-00000.mcap"]
+    assert all(other.exists() for other in others), "what is not a live journal of this robot is nobody's to remove"

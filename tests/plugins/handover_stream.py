@@ -57,14 +57,14 @@ class Handover:
         return self.pull_n * risen * (1.0 if t < self.ends else float(np.exp(-(t - self.ends) / 0.1)))
 
     def samples(self, t_end: float, seed: int = 1, noise_n: float = 0.4, robot: str = "talos") -> Sequence[Sample]:
-        """All three channels at 50 Hz, by time; the wrench with noise of which half is correlated over 0.2 s."""
-        rng = np.random.default_rng(seed)
+        """All three channels at 50 Hz, by time; noise on the wrench, half of it over 0.2 s, 1 mm on the hand."""
+        rng, seen = np.random.default_rng(seed), np.random.default_rng((seed, 1))
         slow, out = 0.0, []
         for k in range(1, round(t_end * 50) + 1):
             t, stamp = k * 0.02, k * PERIOD_NS
             slow = 0.9 * slow + np.sqrt(1 - 0.81) * rng.normal()
             pull = self.force(t) + noise_n * (0.7 * slow + 0.7 * rng.normal())
-            hand_x = POINT[0] + 0.6 * min(max(self.arrives - t, 0.0), 1.0)
+            hand_x = POINT[0] + 0.6 * min(max(self.arrives - t, 0.0), 1.0) + 0.001 * seen.normal()
             wrench = WrenchStamped((float(pull), 0.0, -9.8), (0.0, 0.0, 0.0))
             named = (("plan/handover", self.plan(t)), ("right_wrist/wrench", wrench))
             out += [Sample(stamp, f"{robot}/{name}", value, k) for name, value in named]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+import msgspec
 import numpy as np
 
 from foreshock.detector import Inputs
@@ -44,7 +45,7 @@ class Motion:
         gyro: pitch rate of the trunk (rad/s).
         hand_speed: of the hand (m/s), upwards.
         people: who is there, over time.
-        seed: of the noise: joint rates 0.05 rad/s, gyro 0.03 rad/s, hand 3 mm and 0.03 m/s.
+        seed: of the noise: joint rates 0.05 rad/s, gyro 0.03 rad/s, hand 3 mm and 0.03 m/s, people 1 um.
     """
 
     def __init__(
@@ -58,7 +59,12 @@ class Motion:
     ) -> None:
         self.rates, self.plans = rates or {}, plans or {}
         self.gyro, self.hand_speed, self.people = gyro, hand_speed, people
-        self.rng = np.random.default_rng(seed)
+        self.rng, self.seen = np.random.default_rng(seed), np.random.default_rng((seed, 1))
+
+    def shaken(self, human: HumanPose) -> HumanPose:
+        """As a tracker sees them: never twice the same."""
+        uncertainty = human.uncertainty + abs(1e-6 * self.seen.normal())
+        return msgspec.structs.replace(human, uncertainty=uncertainty)
 
     def samples(self, k: int) -> dict[str, Sample]:
         """The k-th sample of each input, by its name."""
@@ -70,7 +76,7 @@ class Motion:
             "joints": JointState(JOINTS, (0.0, 0.0, 0.0), tuple(rates)),
             "plan": JointState(JOINTS, (0.0, 0.0, 0.0), plan),
             "torso": Imu((0.0, 0.0, 0.0, 1.0), (0.03 * z[4], self.gyro(t) + 0.03 * z[5], 0.0), (0.0, 0.0, 9.81)),
-            "humans": Humans(self.people(t)),
+            "humans": Humans(tuple(map(self.shaken, self.people(t)))),
             "hand-arm": Odometry(
                 hand,
                 (0.0, 0.0, 0.0, 1.0),

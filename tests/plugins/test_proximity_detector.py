@@ -44,13 +44,14 @@ def man(x: float, y: float, ident: str = "man", velocity=None, uncertainty: floa
 
 
 class Scene:
-    """TALOS standing half sitting at 200 Hz, with encoder noise, and one man tracked at 20 Hz.
+    """TALOS standing half sitting at 200 Hz, with noise of encoders and odometry, and one man tracked at 20 Hz.
 
     Args:
         human: his place (x, y) at time t, or None where he is not seen.
         noise_m: of his place, the same for all his capsules.
         measured: whether his velocity is given, with 0.05 m/s of noise.
         arm: position and velocity added to the joint arm_left_4_joint.
+        encoder_rad: noise of the encoders; that of the odometry is a tenth of it, in m.
     """
 
     def __init__(
@@ -69,8 +70,8 @@ class Scene:
         self.names = tuple(self.model.names)[2:]
 
     def samples(self, seconds: float, seed: int = 1) -> list[Sample]:
-        rng, out = np.random.default_rng(seed), []
-        pose = Odometry(*(tuple(self.q[s].tolist()) for s in (slice(0, 3), slice(3, 7))), (0.0,) * 3, (0.0,) * 3)
+        rng, drift, out = np.random.default_rng(seed), np.random.default_rng((seed, 1)), []
+        upright = tuple(self.q[3:7].tolist())
         k = self.names.index("arm_left_4_joint")
         for tick in range(round(seconds * 200) + 1):
             t, stamp = tick / 200, tick * 5 * MS
@@ -80,6 +81,8 @@ class Scene:
             velocity[k] += self.arm(t)[1]
             joints = JointState(self.names, tuple(position.tolist()), tuple(velocity.tolist()))
             out.append(Sample(stamp, "talos/joints/state", joints, tick, stamp))
+            place = self.q[:3] + 0.1 * self.encoder_rad * drift.standard_normal(3)
+            pose = Odometry(tuple(place.tolist()), upright, (0.0,) * 3, (0.0,) * 3)
             out.append(Sample(stamp, "talos/base/odometry", pose, tick, stamp))
             if tick % 10 == 0:
                 out.append(Sample(stamp, "talos/humans/pose", self._humans(t, rng), tick // 10, stamp))

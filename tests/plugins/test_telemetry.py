@@ -113,6 +113,28 @@ def test_a_slow_round_trip_of_the_control_loop_is_a_spike() -> None:
     assert detected(beats(0.0)) == set()  # measures none
 
 
+def test_a_heartbeat_that_stands_still_is_silence() -> None:
+    """Its messages go on with fresh stamps and numbers of their own; the sequence inside stays."""
+
+    def beats(stuck: range) -> list[Sample]:
+        return [
+            Sample(
+                i * 10 * MS, "talos/control/heartbeat", Heartbeat(stuck[0] if i in stuck else i, 0.004), i, i * 10 * MS
+            )
+            for i in range(300)
+        ]
+
+    def dropping(stuck: range) -> list[int]:
+        history = play(SPEC.build(TelemetryConfig()), beats(stuck))
+        return [now // MS for now, said in history if said[DROPOUT].present]
+
+    assert dropping(range(200, 201)) == []
+    # the last beat comes at 2.00 s: silent after ten periods of 10 ms, seen within one tick of 5 ms
+    assert 2100 <= dropping(range(200, 300))[0] <= 2105
+    twice = [s for s in beats(range(200, 201)) for _ in range(2)]
+    assert detected(twice) == set(), "a transport that repeats a message is no sender that stands still"
+
+
 # --- delay
 
 

@@ -103,6 +103,91 @@ def test_only_the_robot_writes_its_streams(plant: Plant) -> None:
         until(lambda: samples(plant, viewer) > before, "the robot's samples arrive")
 
 
+def denied(plant: Plant, name: str, what: str, key: str) -> int:
+    """How often the status says that a peer of this name tried this."""
+    with plant.open("viewer") as viewer:
+        status = until(lambda: plant.status(viewer), "a status")
+    return sum(d.count for d in status.denied if (d.name, d.what, d.key) == (name, what, key))
+
+
+def refused(plant: Plant, reason: str) -> int:
+    with plant.open("viewer") as viewer:
+        status = until(lambda: plant.status(viewer), "a status")
+    return sum(r.count for r in status.refused if reason in r.reason)
+
+
+def test_a_twin_that_writes_interventions_is_shown(plant: Plant) -> None:
+    key = KEYS.service("intervention")
+    before = denied(plant, "scene", "Put", key)
+    with plant.open("scene") as scene:
+        for _ in range(5):
+            scene.put(key, b"go")
+        with scene.declare_publisher(key) as publisher:  # whose key Zenoh has judged once for all
+            for _ in range(4):
+                publisher.put(b"go")
+        until(lambda: denied(plant, "scene", "Put", key) == before + 9, "all nine are shown by name")
+        for what in ("Query", "Delete", "Declare Queryable"):
+            assert denied(plant, "scene", what, key) == 0, "what it did not try is not held against it"
+
+
+def test_a_question_that_only_an_operator_may_ask_is_shown(plant: Plant) -> None:
+    key = KEYS.service("reset")
+    before = denied(plant, "viewer", "Query", key)
+    with plant.open("viewer") as viewer:
+        list(viewer.get(key, payload=b"{}", timeout=1.0))
+    until(lambda: denied(plant, "viewer", "Query", key) == before + 1, "it is shown")
+
+
+def test_a_second_supervisor_is_shown_and_tells_nobody_anything(plant: Plant) -> None:
+    with plant.open("viewer") as viewer, plant.open("robot") as robot:
+        heard = [robot.declare_subscriber(KEYS.service(s)) for s in ("lease", "intervention", "decision")]
+        time.sleep(0.3)
+        with plant.open("supervisor") as second:  # its certificate is the supervisor's own, stolen or from a twin plant
+            for service in ("lease", "intervention", "decision"):
+                second.put(KEYS.service(service), b"second supervisor")
+            token = second.liveliness().declare_token(KEYS.alive("supervisor", "9"))
+            until(lambda: denied(plant, "supervisor", "anything", ""), "no rule names it")
+            until(lambda: denied(plant, "supervisor", "Liveliness Token", KEYS.alive("supervisor", "9")), "its token")
+            assert "supervisor/9" not in until(lambda: plant.status(viewer), "a status").peers
+            token.undeclare()
+        for subscriber in heard:
+            while (sample := subscriber.try_recv()) is not None:
+                assert sample.payload.to_bytes() != b"second supervisor"
+
+
+def test_no_wildcard_reaches_a_service(plant: Plant) -> None:
+    """The robot may write each of its channels, hence all at once: its guard must not hear that as an intervention."""
+    told: list[Intervention] = []
+    guard = Guard("robot", lambda i: told.append(i) is None, lambda _: None, plant.link("robot"), "g2")
+    forged = pack_intervention(Numbered(2**62, 1, Intervention(0, "forged", 1.0)))
+    with plant.open("robot") as robot, plant.open("viewer") as viewer, guard:
+        until(lambda: "guard/g2" in until(lambda: plant.status(viewer), "a status").peers, "the guard is there")
+        for key in ("*/intervention", "*/*", "**", "$*i/intervention", "@$*/intervention"):
+            robot.put(f"foreshock/robot/{key}", forged)
+        time.sleep(0.5)
+        assert "forged" not in {i.action for i in told}
+        assert guard.counts.fenced == 0
+
+
+def test_nobody_else_answers_for_the_supervisor(plant: Plant) -> None:
+    with plant.open("viewer") as viewer, plant.open("scene") as scene, plant.open("robot") as robot:
+        for liar in (scene, robot):
+            for service in ("status", "reset", "config"):
+                key = KEYS.service(service)
+                liar.declare_queryable(key, lambda q, key=key: q.reply(key, b'{"all": "well"}'), complete=True)
+        time.sleep(0.3)
+        for _ in range(5):
+            for reply in viewer.get(KEYS.service("status"), target=target_all(), timeout=3.0):
+                assert b"well" not in reply.ok.payload.to_bytes()
+        until(lambda: denied(plant, "scene", "Declare Queryable", KEYS.service("status")), "it is shown")
+
+
+def target_all() -> Any:
+    import zenoh
+
+    return zenoh.QueryTarget.ALL
+
+
 def test_nobody_but_the_supervisor_tells_a_guard_anything(plant: Plant) -> None:
     told: list[Intervention] = []
     guard = Guard("robot", lambda i: told.append(i) is None, lambda _: None, plant.link("robot"), "g1")
@@ -140,6 +225,7 @@ def test_a_foreign_authority_and_no_certificate_are_refused(plant: Plant, tmp_pa
     init_security(foreign, "robot", {"scene": ["humans/pose"]})
     # a certificate of the right name by the wrong authority, whether or not it trusts ours
     (foreign / "ours.pem").write_bytes((plant.folder / "ca.pem").read_bytes())
+    before = {reason: refused(plant, reason) for reason in ("UnknownCA", "UnknownIssuer", "InvalidContentType")}
     for link in (plant.link("robot", folder=foreign), plant.link("robot", "ours.pem", foreign)):
         session = _opened(link)
         if session is not None:
@@ -149,6 +235,9 @@ def test_a_foreign_authority_and_no_certificate_are_refused(plant: Plant, tmp_pa
     assert _opened(plain) is None
     with plant.open("viewer") as viewer:
         until(lambda: plant.status(viewer), "who shows the right certificate is answered")
+    # it distrusts us, we distrust it, it speaks no TLS: each is shown
+    for reason, count in before.items():
+        until(lambda r=reason, n=count: refused(plant, r) > n, f"the status shows {reason}")
 
 
 def test_a_request_for_a_lease_needs_the_robots_certificate(plant: Plant) -> None:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foreshock.detector import Inputs
+from foreshock.detector import Input, Inputs
 from foreshock.errors import ConfigError
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Humans, Imu, JointState, Odometry, Scalar
@@ -79,10 +79,11 @@ class AbsentFrom:
         return [msgspec.structs.replace(i, present=False, severity=0.0) for i in said]
 
 
-def registry(absent: str = "", from_ns: int = 0) -> Registry:
+def registry(absent: str = "", from_ns: int = 0, still_s: float = 0.1) -> Registry:
     modules = {}
     for name, kind in KINDS.items():
-        spec = threshold_spec(name, kind, f"body/{name}")
+        inputs = (Input("value", f"body/{name}", Scalar, max_standstill_s=still_s),)
+        spec = threshold_spec(name, kind, f"body/{name}", inputs=inputs)
         if name == absent:
             honest = spec.build
             spec = msgspec.structs.replace(spec, build=lambda c, build=honest: AbsentFrom(build(c), from_ns))
@@ -249,13 +250,14 @@ def test_no_lost_frozen_or_spoilt_stream_is_trusted_more_than_an_honest_absence(
     for column in ("control_trust", "trust"):
         worse = zip(faulty.series[column], honest.series[column], strict=True)
         assert all(not f > h + 1e-12 for f, h in worse), column  # rounding of P is 1e-9 at most; equal in fact
-    if kind != "freeze":
-        assert any(h.source == name and h.state in ("unobserved", "failed") for h in faulty.health)
+    assert any(h.source == name and h.state in ("unobserved", "failed") for h in faulty.health)
 
 
-def test_a_frozen_stream_goes_unnoticed_by_the_core() -> None:
-    """What the property above does not promise: it is trusted as much as an honest absence, while the robot falls."""
-    frozen = run("on", {"kind": "freeze", "channel": "*", "from_s": 0.1})
+def test_a_frozen_stream_is_noticed_where_its_reader_declares_a_standstill_and_nowhere_else() -> None:
+    """Where none is declared it is trusted as much as an honest absence, while the robot falls."""
+    table = {"kind": "freeze", "channel": "*", "from_s": 0.1}
+    assert run("on", table).max_level == 3
+    frozen = run("on", table, using=registry(still_s=0.0))
     assert frozen.accident
     assert frozen.max_level == 0
     assert min(frozen.series["control_trust"]) == 1.0

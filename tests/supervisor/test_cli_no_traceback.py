@@ -40,6 +40,10 @@ def folder(tmp_path: Path) -> Path:
         ("config", "check", "binary.toml"),
         ("config", "check", "."),
         ("scenarios", "show", "nowhere"),
+        ("falsify", A1, "--out", "f"),
+        ("falsify", A1, "--out", "f", "--vary", "drop_mu=1:0"),
+        ("falsify", A1, "--out", "f", "--vary", "drop_mu=0.04:0.05", "--formula", "always("),
+        ("falsify", "binary.toml", "--out", "f"),
     ],
 )
 def test_no_traceback(words: tuple[str, ...], folder: Path) -> None:

@@ -47,8 +47,8 @@ def test_liveliness_tokens_are_those_of_rmw_zenoh() -> None:
 def test_our_own_keys_keep_streams_and_services_apart() -> None:
     keys = Keys("talos")
     assert keys.stream("talos/joints/state", "sensor_msgs/msg/JointState") == "foreshock/talos/joints/state"
-    assert keys.service("lease") == "foreshock/talos/_/lease"
-    assert keys.alive("guard", "g1") == "foreshock/talos/_/alive/guard/g1"
+    assert keys.service("lease") == "foreshock/talos/@/lease"
+    assert keys.alive("guard", "g1") == "foreshock/talos/@/alive/guard/g1"
 
 
 @pytest.mark.parametrize("robot", ["", "a/b", "*", "a$", "@x"])

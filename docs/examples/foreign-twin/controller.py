@@ -49,7 +49,7 @@ config, twin = zenoh.Config(), Controller()
 config.insert_json5("listen/endpoints", json.dumps([sys.argv[1]]))
 config.insert_json5("scouting/multicast/enabled", "false")
 with zenoh.open(config) as session:
-    key = "foreshock/robot/_/twin"
+    key = "foreshock/robot/@/twin"
     reply = lambda q: q.reply(key, json.dumps(twin.answer(json.loads(bytes(q.payload)))))  # noqa: E731
     queries = session.declare_queryable(key, reply)
     time.sleep(float(sys.argv[2]) if len(sys.argv) > 2 else 1e9)

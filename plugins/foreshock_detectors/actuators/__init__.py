@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import JointState
+from foreshock_detectors._standstill import BODY_S
 from foreshock_detectors.actuators._config import ActuatorsConfig
 
 __all__ = ["SPEC", "ActuatorsConfig", "foreshock_detectors"]
@@ -25,7 +26,7 @@ SPEC = DetectorSpec(
     id="actuators",
     kinds=("torque-saturation", "actuator-drift"),
     inputs=(
-        Input("joints", "joints/state", JointState, _MAX_AGE_S, _MIN_RATE_HZ),
+        Input("joints", "joints/state", JointState, _MAX_AGE_S, _MIN_RATE_HZ, max_standstill_s=BODY_S),
         Input("command", "joints/command", JointState, _MAX_AGE_S, _MIN_RATE_HZ),
     ),
     build=_build,

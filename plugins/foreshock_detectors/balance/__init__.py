@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Imu, JointState, MotionPlan, Odometry, WrenchStamped
+from foreshock_detectors._standstill import BODY_S
 from foreshock_detectors.balance._config import BalanceConfig
 
 __all__ = ["SPEC", "BalanceConfig", "foreshock_detectors"]
@@ -28,11 +29,27 @@ SPEC = DetectorSpec(
     id="balance",
     kinds=("foot-micro-slip", "torso-angular-spike", "com-lateral-deviation", "sway-amplitude-increase"),
     inputs=(
-        Input("joints", "joints/state", JointState, _MAX_AGE_S, _MIN_RATE_HZ),
-        Input("odometry", "base/odometry", Odometry, _MAX_AGE_S, _MIN_RATE_HZ),
-        Input("imu", "imu/torso", Imu, _MAX_AGE_S, _MIN_RATE_HZ, required=False),
-        Input("left_wrench", "left_sole/wrench", WrenchStamped, _MAX_AGE_S, _MIN_RATE_HZ, required=False),
-        Input("right_wrench", "right_sole/wrench", WrenchStamped, _MAX_AGE_S, _MIN_RATE_HZ, required=False),
+        Input("joints", "joints/state", JointState, _MAX_AGE_S, _MIN_RATE_HZ, max_standstill_s=BODY_S),
+        Input("odometry", "base/odometry", Odometry, _MAX_AGE_S, _MIN_RATE_HZ, max_standstill_s=BODY_S),
+        Input("imu", "imu/torso", Imu, _MAX_AGE_S, _MIN_RATE_HZ, required=False, max_standstill_s=BODY_S),
+        Input(
+            "left_wrench",
+            "left_sole/wrench",
+            WrenchStamped,
+            _MAX_AGE_S,
+            _MIN_RATE_HZ,
+            required=False,
+            max_standstill_s=BODY_S,
+        ),
+        Input(
+            "right_wrench",
+            "right_sole/wrench",
+            WrenchStamped,
+            _MAX_AGE_S,
+            _MIN_RATE_HZ,
+            required=False,
+            max_standstill_s=BODY_S,
+        ),
         Input("plan", "plan/motion", MotionPlan, 0.1, 0.0, required=False),
     ),
     build=_build,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import GripState, Odometry, Scalar, WrenchStamped
+from foreshock_detectors._standstill import BODY_S, TRACKED_S
 from foreshock_detectors.co_carry._config import CoCarryConfig
 
 __all__ = ["CoCarryConfig", "foreshock_detectors", "inputs"]
@@ -16,10 +17,10 @@ def inputs(config: CoCarryConfig) -> tuple[Input, ...]:
     """Wrist, agreed share, tracked load and gripper. None is required: each kind is unobserved without its own."""
     age, rate = config.max_age_s, config.min_rate_hz
     return (
-        Input("wrench", "wrist/wrench", WrenchStamped, age, rate, required=False),
+        Input("wrench", "wrist/wrench", WrenchStamped, age, rate, required=False, max_standstill_s=BODY_S),
         Input("share", "plan/share", Scalar, age, required=False),
-        Input("load", "load/odometry", Odometry, age, rate, required=False),
-        Input("grip", "gripper/state", GripState, age, rate, required=False),
+        Input("load", "load/odometry", Odometry, age, rate, required=False, max_standstill_s=TRACKED_S),
+        Input("grip", "gripper/state", GripState, age, rate, required=False, max_standstill_s=BODY_S),
     )
 
 

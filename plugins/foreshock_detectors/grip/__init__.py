@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import GripState
+from foreshock_detectors._standstill import BODY_S
 from foreshock_detectors.grip._config import GripConfig
 
 __all__ = ["GripConfig", "foreshock_detectors", "inputs"]
@@ -19,7 +20,14 @@ def inputs(config: GripConfig) -> tuple[Input, ...]:
     the other hand would hide it.
     """
     return tuple(
-        Input(name, f"{gripper}/state", GripState, max_age_s=config.max_age_s, min_rate_hz=config.min_rate_hz)
+        Input(
+            name,
+            f"{gripper}/state",
+            GripState,
+            max_age_s=config.max_age_s,
+            min_rate_hz=config.min_rate_hz,
+            max_standstill_s=BODY_S,
+        )
         for name, gripper in config.names
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Humans, TaskPhase, WrenchStamped
+from foreshock_detectors._standstill import BODY_S, TRACKED_S
 from foreshock_detectors.handover._config import HandoverConfig
 
 __all__ = ["HandoverConfig", "foreshock_detectors", "inputs"]
@@ -17,8 +18,8 @@ def inputs(config: HandoverConfig) -> tuple[Input, ...]:
     age = config.max_age_s
     return (
         Input("plan", "plan/handover", TaskPhase, max_age_s=age),
-        Input("wrench", "right_wrist/wrench", WrenchStamped, max_age_s=age),
-        Input("humans", "humans/pose", Humans, max_age_s=age),
+        Input("wrench", "right_wrist/wrench", WrenchStamped, max_age_s=age, max_standstill_s=BODY_S),
+        Input("humans", "humans/pose", Humans, max_age_s=age, max_standstill_s=TRACKED_S),
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Imu, Odometry
+from foreshock_detectors._standstill import BODY_S, TRACKED_S
 from foreshock_detectors.load._config import LoadConfig
 
 __all__ = ["SPEC", "LoadConfig", "foreshock_detectors", "inputs"]
@@ -19,8 +20,8 @@ def inputs(config: LoadConfig) -> tuple[Input, ...]:
     """
     gripper, age = config.gripper, config.max_age_s
     return (
-        Input("imu", f"{gripper}/imu", Imu, max_age_s=age),
-        Input("object", f"{gripper}/object", Odometry, max_age_s=age),
+        Input("imu", f"{gripper}/imu", Imu, max_age_s=age, max_standstill_s=BODY_S),
+        Input("object", f"{gripper}/object", Odometry, max_age_s=age, max_standstill_s=TRACKED_S),
         Input("command", f"{gripper}/object_command", Odometry, max_age_s=age),
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Humans, Odometry, PlannedPath
+from foreshock_detectors._standstill import BODY_S, TRACKED_S
 from foreshock_detectors.navigation._config import NavigationConfig
 
 __all__ = ["NavigationConfig", "foreshock_detectors", "inputs"]
@@ -15,10 +16,13 @@ __all__ = ["NavigationConfig", "foreshock_detectors", "inputs"]
 def inputs(config: NavigationConfig) -> tuple[Input, ...]:
     """Base, people, the robot's planned path, and the odometry of each limb of its own."""
     return (
-        Input("odometry", "base/odometry", Odometry, config.max_age_s),
-        Input("humans", "humans/pose", Humans, config.humans_max_age_s),
+        Input("odometry", "base/odometry", Odometry, config.max_age_s, max_standstill_s=BODY_S),
+        Input("humans", "humans/pose", Humans, config.humans_max_age_s, max_standstill_s=TRACKED_S),
         Input("path", "plan/path", PlannedPath, config.path_max_age_s),
-        *(Input(limb, f"{limb}/odometry", Odometry, config.max_age_s) for limb in config.limbs),
+        *(
+            Input(limb, f"{limb}/odometry", Odometry, config.max_age_s, max_standstill_s=BODY_S)
+            for limb in config.limbs
+        ),
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Gaze, Humans, Odometry
+from foreshock_detectors._standstill import BODY_S, TRACKED_S
 from foreshock_detectors.people._config import PeopleConfig
 
 __all__ = ["PeopleConfig", "foreshock_detectors", "inputs"]
@@ -14,12 +15,13 @@ __all__ = ["PeopleConfig", "foreshock_detectors", "inputs"]
 
 def inputs(config: PeopleConfig) -> tuple[Input, ...]:
     """``humans/pose``, one optional gaze per configured human, and the base where the workspace moves with it."""
-    found = [Input("humans", "humans/pose", Humans, max_age_s=config.max_age_s)]
+    found = [Input("humans", "humans/pose", Humans, max_age_s=config.max_age_s, max_standstill_s=TRACKED_S)]
     found += [
-        Input(name, f"{human}/gaze", Gaze, max_age_s=config.max_age_s, required=False) for name, human in config.gazes
+        Input(name, f"{human}/gaze", Gaze, max_age_s=config.max_age_s, required=False, max_standstill_s=TRACKED_S)
+        for name, human in config.gazes
     ]
     if config.workspace_frame == "base":
-        found.append(Input("base", "base/odometry", Odometry, max_age_s=config.max_age_s))
+        found.append(Input("base", "base/odometry", Odometry, max_age_s=config.max_age_s, max_standstill_s=BODY_S))
     return tuple(found)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Humans, JointState, Odometry
+from foreshock_detectors._standstill import BODY_S, TRACKED_S
 from foreshock_detectors.proximity._config import ProximityConfig
 
 __all__ = ["SPEC", "ProximityConfig", "foreshock_detectors"]
@@ -31,9 +32,9 @@ SPEC = DetectorSpec(
     id="proximity",
     kinds=("human-proximity-breach", "narrowing-clearance"),
     inputs=(
-        Input("joints", "joints/state", JointState, _MAX_AGE_S, _MIN_RATE_HZ),
-        Input("odometry", "base/odometry", Odometry, _MAX_AGE_S, _MIN_RATE_HZ),
-        Input("humans", "humans/pose", Humans, _HUMANS_MAX_AGE_S, _HUMANS_MIN_RATE_HZ),
+        Input("joints", "joints/state", JointState, _MAX_AGE_S, _MIN_RATE_HZ, max_standstill_s=BODY_S),
+        Input("odometry", "base/odometry", Odometry, _MAX_AGE_S, _MIN_RATE_HZ, max_standstill_s=BODY_S),
+        Input("humans", "humans/pose", Humans, _HUMANS_MAX_AGE_S, _HUMANS_MIN_RATE_HZ, max_standstill_s=TRACKED_S),
     ),
     build=_build,
     config=ProximityConfig,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import JointState, MotionCommand, Odometry, TaskPhase
+from foreshock_detectors._standstill import BODY_S
 from foreshock_detectors.restart._config import RestartConfig
 
 __all__ = ["RestartConfig", "foreshock_detectors", "inputs"]
@@ -15,9 +16,9 @@ __all__ = ["RestartConfig", "foreshock_detectors", "inputs"]
 def inputs(config: RestartConfig) -> tuple[Input, ...]:
     """The measured motion and its command; the plan's phase is optional, without it nothing is said of timing."""
     if config.motion == "odometry":
-        motion = Input("motion", "base/odometry", Odometry, max_age_s=config.max_age_s)
+        motion = Input("motion", "base/odometry", Odometry, max_age_s=config.max_age_s, max_standstill_s=BODY_S)
     else:
-        motion = Input("motion", "joints/state", JointState, max_age_s=config.max_age_s)
+        motion = Input("motion", "joints/state", JointState, max_age_s=config.max_age_s, max_standstill_s=BODY_S)
     return (
         motion,
         Input("command", "motion/command", MotionCommand, max_age_s=config.max_age_s),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import MotionPlan, Odometry
+from foreshock_detectors._standstill import BODY_S
 from foreshock_detectors.swing_leg._config import SwingLegConfig
 
 __all__ = ["SwingLegConfig", "foreshock_detectors", "inputs"]
@@ -17,9 +18,12 @@ def inputs(config: SwingLegConfig) -> tuple[Input, ...]:
     return (
         Input("plan", "plan/motion", MotionPlan, config.max_age_s, config.min_rate_hz),
         *(
-            Input(name, channel, Odometry, config.max_age_s, config.min_rate_hz)
+            Input(name, channel, Odometry, config.max_age_s, config.min_rate_hz, max_standstill_s=standstill_s)
             for foot in config.feet
-            for name, channel in ((foot, f"{foot}_foot/odometry"), (f"{foot}-plan", f"{foot}_foot/plan"))
+            for name, channel, standstill_s in (
+                (foot, f"{foot}_foot/odometry", BODY_S),
+                (f"{foot}-plan", f"{foot}_foot/plan", 0.0),
+            )
         ),
     )
 

@@ -23,6 +23,7 @@ class ChannelTrack:
         stamp_ns: newest source stamp.
         aperiodic: it sends on events.
         arrived_ns: arrival of the newest message, -1 before the first.
+        beat: sequence number inside the last heartbeat, if it carries heartbeats.
         latency: its latency beyond the least one seen, plus the base latency.
         latency_s: latency of the last message (s).
         lost: messages lost, fading.
@@ -33,8 +34,8 @@ class ChannelTrack:
 
     __slots__ = (
         "_backward", "_base_s", "_before_s", "_drift", "_fixed", "_last_s", "_loss_tau_ns", "_offset_s", "_period",
-        "_periods", "_silence_floor_ns", "aperiodic", "arrived_ns", "channel", "heard", "latency", "latency_s", "lost",
-        "period_s", "seq", "silence_ns", "stamp_ns",
+        "_periods", "_silence_floor_ns", "aperiodic", "arrived_ns", "beat", "channel", "heard", "latency", "latency_s",
+        "lost", "period_s", "seq", "silence_ns", "stamp_ns",
     )  # fmt: skip
 
     def __init__(self, channel: str, config: TelemetryConfig, period_s: float, aperiodic: bool) -> None:
@@ -50,6 +51,7 @@ class ChannelTrack:
         if period_s > 0.0 and not aperiodic:
             self._expect(period_s)
         self.seq, self.stamp_ns, self.arrived_ns = -1, -1, -1
+        self.beat: int | None = None
         self.lost = self.heard = self.latency_s = 0.0
         self._offset_s = self._before_s = self._last_s = 0.0
         self._backward = 0

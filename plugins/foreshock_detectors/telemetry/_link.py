@@ -54,6 +54,9 @@ class Link:
         if type(value) is Heartbeat:
             if seq < 0:
                 seq = value.sequence
+            if value.sequence == track.beat and stamp_ns > track.stamp_ns:
+                return  # sent again and again by something that no longer beats: silence
+            track.beat = value.sequence
             self._loop(value.round_trip_s, sample, arrived_ns)
         spiked, disordered = track.push(stamp_ns, seq, arrived_ns)
         self._latency_s = track.latency_s

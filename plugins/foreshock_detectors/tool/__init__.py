@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Humans, Odometry, WrenchStamped
+from foreshock_detectors._standstill import BODY_S, TRACKED_S
 from foreshock_detectors.tool._config import ToolConfig
 
 __all__ = ["SPEC", "ToolConfig", "foreshock_detectors", "inputs"]
@@ -20,10 +21,17 @@ def inputs(config: ToolConfig) -> tuple[Input, ...]:
     """
     tool, age = config.tool, config.max_age_s
     return (
-        Input("pose", f"{tool}/odometry", Odometry, max_age_s=age),
+        Input("pose", f"{tool}/odometry", Odometry, max_age_s=age, max_standstill_s=BODY_S),
         Input("command", f"{tool}/command", Odometry, max_age_s=age),
-        Input("humans", "humans/pose", Humans, max_age_s=config.humans_max_age_s, required=False),
-        Input("wrench", f"{tool}/wrench", WrenchStamped, max_age_s=age, required=False),
+        Input(
+            "humans",
+            "humans/pose",
+            Humans,
+            max_age_s=config.humans_max_age_s,
+            required=False,
+            max_standstill_s=TRACKED_S,
+        ),
+        Input("wrench", f"{tool}/wrench", WrenchStamped, max_age_s=age, required=False, max_standstill_s=BODY_S),
         Input("expected", f"{tool}/expected_wrench", WrenchStamped, max_age_s=age, required=False),
     )
 

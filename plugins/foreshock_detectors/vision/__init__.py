@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from foreshock.detector import Detector, DetectorSpec, Input
 from foreshock.hookspecs import hookimpl
 from foreshock.messages import Detections, ImageStatistics
+from foreshock_detectors._standstill import TRACKED_S
 from foreshock_detectors.vision._config import KINDS, VisionConfig
 
 __all__ = ["VisionConfig", "foreshock_detectors", "inputs"]
@@ -20,7 +21,16 @@ def inputs(config: VisionConfig) -> tuple[Input, ...]:
     tracks = any(kind != "visual-degradation" for kind in config.kinds)
     found: tuple[Input, ...] = ()
     if tracks:
-        found = (Input("detections", "vision/detections", Detections, config.max_age_s, config.min_rate_hz),)
+        found = (
+            Input(
+                "detections",
+                "vision/detections",
+                Detections,
+                config.max_age_s,
+                config.min_rate_hz,
+                max_standstill_s=TRACKED_S,
+            ),
+        )
     if "visual-degradation" in config.kinds:
         statistics = Input("statistics", "camera/statistics", ImageStatistics, config.max_age_s, required=not tracks)
         found = (*found, statistics)

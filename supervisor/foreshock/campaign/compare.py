@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 import msgspec
 
 from foreshock.campaign.ledger import Row
+from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.paired import holm, mcnemar
 from foreshock.campaign.plan import Plan
-from foreshock.campaign.results import Scope, acted_s, scopes_of
-from foreshock.campaign.spec import ArmEntry
+from foreshock.campaign.results import Scope, scopes_of
 
 __all__ = ["LEVEL", "Change", "compare"]
 
@@ -19,7 +19,6 @@ LEVEL = 0.05
 """Chance that any result is called worse where nothing has changed."""
 
 Seat = tuple[str, str, int, int, str]
-Event = Callable[[Row], bool]
 
 
 class Change(msgspec.Struct, frozen=True):
@@ -28,8 +27,8 @@ class Change(msgspec.Struct, frozen=True):
     Attributes:
         scope: overall, or a mode.
         arm: id.
-        metric: ``accidents``, ``false-interventions``, ``lead-time`` or ``failures``.
-        before: value in the first campaign: a rate, or a median in s; NaN if there is none.
+        metric: ``accidents``, ``false-interventions``, ``lead-time``, ``reduced-speed`` or ``failures``.
+        before: value in the first campaign: a rate, or a median in s or as a share of time; NaN if there is none.
         after: in the second.
         n: runs that were compared.
         paired: whether the same runs were compared, one by one.
@@ -55,7 +54,7 @@ def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]
     """Every metric of the arms that both campaigns have, overall and per mode.
 
     Runs of the same scenario, parameters, fault, seed and arm are compared one by one (McNemar; Wilcoxon's signed ranks
-    for lead times); where the campaigns share none, as independent samples (Fisher's exact test; Mann and Whitney's).
+    for times); where the campaigns share none, as independent samples (Fisher's exact test; Mann and Whitney's).
 
     Args:
         before: plan and rows of the first campaign.
@@ -63,49 +62,17 @@ def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]
     """
     arms = {a.id: a for a in before[0].spec.arms}
     shared = [a for a in after[0].spec.arms if a.id in arms]
-    sides = [_Side(*before), _Side(*after)]
+    sides = [Outcomes(*before), Outcomes(*after)]
+    tables = [before[1], after[1]]
     found: list[Change] = []
     scopes = [s for s in scopes_of([*before[1], *after[1]]) if s[0].kind in ("overall", "mode")]
     for scope, belongs in scopes[1:] if len(scopes) == 2 else scopes:  # one mode is the whole
         for arm in shared:
-            first, second = (side.rows(arm, belongs) for side in sides)
+            first, second = ({_seat(r): r for r in rows if r.arm == arm.id and belongs(r)} for rows in tables)
             if first and second:
                 found += _changes(scope, arm.id, sides, first, second)
     adjusted = holm([c.p for c in found])
     return [msgspec.structs.replace(c, p=p) for c, p in zip(found, adjusted, strict=True)]
-
-
-class _Side:
-    """One campaign: its arms, and the reference run of each run."""
-
-    def __init__(self, plan: Plan, rows: Sequence[Row]) -> None:
-        self._arms: Mapping[str, ArmEntry] = {a.id: a for a in plan.spec.arms}
-        self._all = rows
-        reference = plan.spec.reference_arm
-        self._reference = {
-            (r.scenario, r.point, r.replicate, r.fault): r
-            for r in rows
-            if reference is not None and r.arm == reference.id and r.ok
-        }
-
-    def rows(self, arm: ArmEntry, belongs: Event) -> dict[Seat, Row]:
-        """Runs of an arm by what makes them comparable."""
-        return {_seat(r): r for r in self._all if r.arm == arm.id and belongs(r)}
-
-    def _partner(self, row: Row) -> Row | None:
-        return self._reference.get((row.scenario, row.point, row.replicate, row.fault))
-
-    def false(self, row: Row) -> bool | None:
-        """Whether it is a false intervention; None where the reference came to harm."""
-        partner = self._partner(row)
-        if partner is None or partner.event_s is not None or not row.ok:
-            return None
-        return acted_s(row, self._arms[row.arm]) is not None
-
-    def lead_s(self, row: Row) -> float | None:
-        """Time from the intervention to the reference's accident."""
-        partner, at_s = self._partner(row), acted_s(row, self._arms[row.arm])
-        return None if partner is None or partner.accident_s is None or at_s is None else partner.accident_s - at_s
 
 
 def _seat(row: Row) -> Seat:
@@ -114,7 +81,7 @@ def _seat(row: Row) -> Seat:
 
 
 def _changes(
-    scope: Scope, arm: str, sides: Sequence[_Side], first: Mapping[Seat, Row], second: Mapping[Seat, Row]
+    scope: Scope, arm: str, sides: Sequence[Outcomes], first: Mapping[Seat, Row], second: Mapping[Seat, Row]
 ) -> list[Change]:
     found = []
     events: dict[str, list[Callable[[Row], bool | None]]] = {
@@ -132,7 +99,14 @@ def _changes(
         for side, rows in zip(sides, (first, second), strict=True)
     )
     if x and y:
-        found.append(_of_times(scope, arm, x, y))
+        found.append(_of_times(scope, arm, "lead-time", x, y))
+    x, y = (
+        {k: -share for k, r in rows.items() if (share := side.reduced(r)) is not None}
+        for side, rows in zip(sides, (first, second), strict=True)
+    )
+    if x and y:
+        change = _of_times(scope, arm, "reduced-speed", x, y)
+        found.append(msgspec.structs.replace(change, before=-change.before, after=-change.after))
     return found
 
 
@@ -151,7 +125,7 @@ def _of_events(scope: Scope, arm: str, metric: str, a: Mapping[Seat, bool], b: M
     return Change(scope, arm, metric, _mean(first), _mean(second), len(second), bool(both), p)
 
 
-def _of_times(scope: Scope, arm: str, a: Mapping[Seat, float], b: Mapping[Seat, float]) -> Change:
+def _of_times(scope: Scope, arm: str, metric: str, a: Mapping[Seat, float], b: Mapping[Seat, float]) -> Change:
     from scipy.stats import mannwhitneyu, wilcoxon
 
     both = [k for k in a if k in b]
@@ -162,7 +136,7 @@ def _of_times(scope: Scope, arm: str, a: Mapping[Seat, float], b: Mapping[Seat, 
     else:
         x, y = list(a.values()), list(b.values())
         p = float(mannwhitneyu(y, x, alternative="less").pvalue)
-    return Change(scope, arm, "lead-time", _median(x), _median(y), len(y), bool(both), p)
+    return Change(scope, arm, metric, _median(x), _median(y), len(y), bool(both), p)
 
 
 def _mean(values: Sequence[bool]) -> float:

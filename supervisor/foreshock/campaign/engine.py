@@ -106,14 +106,15 @@ def _facts(plan: Plan) -> dict[str, Any]:
     return {"identity": plan.identity, "keys": [c.key for c in plan.cases]}
 
 
-def refuse_changes(folder: Path, found: Sequence[str]) -> None:
+def refuse_changes(
+    folder: Path, found: Sequence[str], hint: str = "\nwith --accept what depends on it is run again"
+) -> None:
     """Say what has changed.
 
     Raises:
         ConfigError: anything has.
     """
     if found:
-        hint = "\nwith --accept what depends on it is run again"
         raise ConfigError(str(folder), "is not what it was when it was begun:\n  " + "\n  ".join(found), hint)
 
 
@@ -269,7 +270,7 @@ def execute(
     Raises:
         BadInputError: one of the first runs names something that does not exist, or another process runs it.
     """
-    with locked(campaign.folder), Ledger(campaign.folder) as ledger, _scratch(campaign.folder) as scratch:
+    with locked(campaign.folder), Ledger(campaign.folder) as ledger, scratch_in(campaign.folder) as scratch:
         if retry:
             ledger.forget()
         feed = _Feed(campaign, ledger, workers, estimated, told)
@@ -278,8 +279,8 @@ def execute(
 
 
 @contextmanager
-def _scratch(folder: Path) -> Iterator[Path]:
-    """A folder for what is temporary, inside the campaign's: what a killed campaign left there is removed."""
+def scratch_in(folder: Path) -> Iterator[Path]:
+    """A folder for what is temporary, inside the campaign's: what a killed one left there is removed."""
     scratch = folder / SCRATCH
     shutil.rmtree(scratch, ignore_errors=True)
     scratch.mkdir()

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from foreshock.campaign.plan import Case
+from foreshock.clock import ns, seconds
 from foreshock.errors import BadInputError, ConfigError
 from foreshock.records import Intervention
 from foreshock.session.isolated import Failure
@@ -60,6 +61,10 @@ class Row(msgspec.Struct, frozen=True):
         peak_p: highest P of the mode before the accident.
         first_s: first time of each precursor kind of the mode.
         policy: what acted, or would have.
+        safe_s: since when the mode's control-level trust has been at its caution gate or above until the end; None if
+            it was not at the end, the accident happened, or nobody judged.
+        reduced_s: how long any action held, or would have in shadow, that the twin understands and that is more than
+            announcing: time at reduced speed, or standing; None in ledgers from before it was recorded.
         wall_s: wall time of the run; the one column that is not the same when it is run again.
     """
 
@@ -88,6 +93,8 @@ class Row(msgspec.Struct, frozen=True):
     first_s: dict[str, float] = {}
     policy: str = ""
     wall_s: float | None = None
+    safe_s: float | None = None
+    reduced_s: float | None = None
 
     @property
     def ok(self) -> bool:
@@ -118,7 +125,23 @@ def row_of(case: Case, result: Run | Failure, wall_s: float, scripted: tuple[Int
         first_s=result.first_s,
         policy=result.policy,
         wall_s=wall_s,
+        safe_s=result.safe_s,
+        reduced_s=_held_s([i for i in changes if i.action not in result.ignored], result.end_s),
     )
+
+
+def _held_s(changes: Iterable[Intervention], end_s: float) -> float:
+    """How long some action other than announcing held until the end."""
+    active: set[str] = set()
+    since_ns, held_ns, end_ns = 0, 0, ns(end_s)
+    for change in sorted(changes, key=lambda i: i.stamp_ns):
+        if change.action == "announce" or change.stamp_ns >= end_ns:
+            continue
+        if active:
+            held_ns += change.stamp_ns - since_ns
+        since_ns = change.stamp_ns
+        (active.add if change.strength > 0.0 else active.discard)(change.action)
+    return seconds(held_ns + (end_ns - since_ns if active else 0))
 
 
 _SCHEMA = """
@@ -143,9 +166,6 @@ class Ledger:
 
     def __init__(self, folder: Path, *, new: bool = False) -> None:
         path = folder / LEDGER
-        if new and path.exists():
-            hint = f"; continue it with: foreshock campaign resume {folder}"
-            raise ConfigError(str(folder), "holds a campaign already", hint)
         if not new and not path.exists():
             raise ConfigError(str(folder), f"holds no campaign: there is no {LEDGER}")
         folder.mkdir(parents=True, exist_ok=True)
@@ -157,6 +177,11 @@ class Ledger:
         except sqlite3.DatabaseError as e:
             self._db.close()
             raise BadInputError(str(path), f"is no ledger: {e}") from None
+        # one that was killed before it kept anything is no campaign yet
+        if new and self._db.execute("select 1 from meta limit 1").fetchone():
+            self._db.close()
+            hint = f"; continue it with: foreshock campaign resume {folder}"
+            raise ConfigError(str(folder), "holds a campaign already", hint)
 
     def __enter__(self) -> Ledger:
         return self
@@ -178,10 +203,15 @@ class Ledger:
 
     def meta(self, name: str, to: type[T]) -> T:
         """A fact about the campaign."""
-        found = self._db.execute("select value from meta where name = ?", (name,)).fetchone()
+        found = self.known(name, to)
         if found is None:
             raise ConfigError(LEDGER, f"{name} is missing: the campaign was never begun")
-        return msgspec.json.decode(found[0], type=to)
+        return found
+
+    def known(self, name: str, to: type[T]) -> T | None:
+        """A fact, or None if it was never kept."""
+        found = self._db.execute("select value from meta where name = ?", (name,)).fetchone()
+        return None if found is None else msgspec.json.decode(found[0], type=to)
 
     def put(self, row: Row, changes: tuple[Intervention, ...] = ()) -> None:
         """Keep a result, and the interventions of the run for those that take them."""

@@ -19,7 +19,7 @@ from foreshock.records import Intervention
 from foreshock.registry import Registry
 from foreshock.session.isolated import Job
 from foreshock.session.run import Arm
-from foreshock.session.scenario import Scenario, find_scenario, load_scenario, scenario_ids
+from foreshock.session.scenario import VARIANT, Scenario, find_scenario, load_scenario, scenario_ids
 from foreshock.session.scripted import held, moved
 
 __all__ = ["Case", "Plan", "plan_of", "under"]
@@ -160,7 +160,7 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
 def _content(scenario: Scenario) -> dict[str, Any]:
     """What of a scenario decides a run: its files count by content, not by place."""
     tables: dict[str, Any] = msgspec.to_builtins(scenario)
-    return {k: v for k, v in tables.items() if k not in ("folder", "title", "severity", "expect")}
+    return {k: v for k, v in tables.items() if k not in ("folder", "title", "severity", "expect", "safe", "seed")}
 
 
 def _scenarios(spec: CampaignSpec, folder: Path, registry: Registry) -> list[tuple[Scenario, int]]:
@@ -189,7 +189,7 @@ def _matching(entry: ScenarioEntry, folder: Path, registry: Registry) -> list[Sc
         return [load_scenario(folder / entry.use)]
     if not any(c in entry.use for c in "*?["):
         return [find_scenario(entry.use, registry)]
-    known = scenario_ids(registry)
+    known = scenario_ids(registry, variants=VARIANT in entry.use)
     matching = [known[id_] for id_ in sorted(known) if fnmatchcase(id_, entry.use)]
     if not matching:
         raise ConfigError("scenarios.use", f"no scenario matches {entry.use!r}")

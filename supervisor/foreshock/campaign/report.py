@@ -1,33 +1,60 @@
-"""Writes what a campaign found into its folder: two Parquet files and one HTML page."""
+"""Writes what a campaign found into its folder: Parquet files and one HTML page; and its ranking as Markdown."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 
 from foreshock.campaign.engine import Campaign
-from foreshock.campaign.export import flat_result, flat_row, write_parquet
+from foreshock.campaign.export import flat_duel, flat_forecasts, flat_result, flat_row, flat_trace, write_parquet
+from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.page import write_page
+from foreshock.campaign.ranking import duels_of, standings_of
 from foreshock.campaign.results import ArmResult, results_of
+from foreshock.campaign.trace import traces_of
+from foreshock.campaign.verdicts import bouts, markdown
 
-__all__ = ["write_results"]
+__all__ = ["ranking_of", "write_results"]
 
 
 def write_results(campaign: Campaign) -> tuple[list[ArmResult], list[Path]]:
-    """Judge what was run so far and write runs.parquet, results.parquet and report.html.
+    """Judge what was run so far and write the Parquet files and report.html.
 
     Returns:
         The results, and the files.
 
     Raises:
-        MissingExtraError: pyarrow, jinja2 or scipy is not installed.
+        MissingExtraError: pyarrow, jinja2, scikit-learn or scipy is not installed.
     """
-    rows = campaign.rows()
-    results = results_of(campaign.plan, rows)
-    metadata = {"campaign": campaign.plan.spec.id, "identity": msgspec.json.encode(campaign.plan.identity).decode()}
-    paths = [campaign.folder / name for name in ("runs.parquet", "results.parquet", "report.html")]
-    write_parquet(paths[0], [flat_row(r) for r in rows], metadata)
-    write_parquet(paths[1], [flat_result(r) for r in results], metadata)
-    write_page(paths[2], campaign, rows, results)
-    return results, paths
+    plan, rows = campaign.plan, campaign.rows()
+    results = results_of(plan, rows)
+    traces, standings, duels = traces_of(plan, rows, results), standings_of(plan, results), duels_of(plan, rows)
+    outcomes = Outcomes(plan, rows)
+    metadata = {"campaign": plan.spec.id, "identity": msgspec.json.encode(plan.identity).decode()}
+    tables = {
+        "runs": [flat_row(r, outcomes) for r in rows],
+        "results": [flat_result(r) for r in results],
+        "forecasts": flat_forecasts(results, rows),
+        "traceability": [flat_trace(t) for t in traces],
+        "duels": [flat_duel(d) for d in duels],
+    }
+    paths = [campaign.folder / f"{name}.parquet" for name in tables]
+    for path, table in zip(paths, tables.values(), strict=True):
+        write_parquet(path, table, metadata)
+    page = campaign.folder / "report.html"
+    write_page(page, campaign, rows, results, traces, (standings, duels))
+    return results, [*paths, page]
+
+
+def ranking_of(campaign: Campaign, results: Sequence[ArmResult]) -> str:
+    """Which arm wins where, and where Foreshock loses, as Markdown.
+
+    Args:
+        campaign: that it is of.
+        results: of results_of.
+    """
+    plan, rows = campaign.plan, campaign.rows()
+    total = sum(r.ok for r in rows), len(plan.cases)
+    return markdown(plan, total, standings_of(plan, results), bouts(duels_of(plan, rows), results))

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from statistics import quantiles
 from typing import Literal, TypeAlias
 
 import msgspec
 
+from foreshock.campaign.forecast import Bin, Brier, Discrimination, auc_difference, brier, discrimination, reliability
 from foreshock.campaign.ledger import Row
+from foreshock.campaign.outcomes import Outcomes, seat_of
 from foreshock.campaign.paired import PairedDifference, paired_difference
 from foreshock.campaign.plan import Plan
 from foreshock.campaign.spec import ArmEntry
-from foreshock.records import ProtectionLevel
+from foreshock.campaign.times import Times, TimeShare, share_of_time
 from foreshock.session.rates import Frequency, Rate, per_hour, wilson
 
-__all__ = ["ArmResult", "Brier", "Scope", "acted_s", "frequency", "results_of", "scopes_of", "shown"]
+__all__ = ["ArmResult", "Scope", "forecasts", "frequency", "results_of", "scopes_of", "shown"]
 
 ScopeKind: TypeAlias = Literal["overall", "mode", "scenario", "fault", "factor"]
 SEVERAL = 12
@@ -28,20 +29,6 @@ class Scope(msgspec.Struct, frozen=True):
 
     kind: ScopeKind
     name: str = ""
-
-
-class Brier(msgspec.Struct, frozen=True):
-    """Mean squared error of P against what happened, with its 95% interval (normal approximation).
-
-    The forecast of a run is the highest P of the mode before the accident, judged in shadow: where the supervisor acts,
-    what happens is no test of its forecast. base is the score of always saying the observed rate.
-    """
-
-    score: float
-    low: float
-    high: float
-    base: float
-    n: int
 
 
 class ArmResult(msgspec.Struct, frozen=True):
@@ -60,8 +47,16 @@ class ArmResult(msgspec.Struct, frozen=True):
         caused: accidents that happened here and not under the reference.
         lead_s: from the intervention to the accident under the reference, one per run that has both, sorted; negative:
             too late.
-        false: interventions in runs whose reference run came to no harm, per hour of such runs.
+        false: interventions in runs whose reference run came to no harm, per hour of such runs; of arms that decide
+            themselves: one that takes another's interventions does nothing where that one did nothing.
+        safe: time from the intervention to the safe state, of runs of a judged arm without the accident; None if nobody
+            judged, or it was not recorded.
+        reduced: share of the time of runs whose reference run came to no harm in which an action held; None if there
+            are none, or it was not recorded.
         brier: of P, for an arm in shadow.
+        reliability: of P, likewise.
+        discrimination: of P, likewise.
+        scenarios: in which it ran.
     """
 
     scope: Scope
@@ -75,7 +70,12 @@ class ArmResult(msgspec.Struct, frozen=True):
     caused: int
     lead_s: tuple[float, ...]
     false: Frequency | None
+    safe: Times | None
+    reduced: TimeShare | None
     brier: Brier | None
+    reliability: tuple[Bin, ...]
+    discrimination: Discrimination | None
+    scenarios: int
 
     @property
     def lead_quartiles_s(self) -> tuple[float, float, float] | None:
@@ -86,17 +86,6 @@ class ArmResult(msgspec.Struct, frozen=True):
             return (self.lead_s[0],) * 3
         low, middle, high = quantiles(self.lead_s, n=4, method="inclusive")
         return low, middle, high
-
-
-def acted_s(row: Row, arm: ArmEntry) -> float | None:
-    """When a run intervened: at the protective level, or by its first action where an arm acts by action."""
-    if arm.kind == "none":
-        return None
-    if arm.scripted or arm.acts_by == "action":
-        return row.acted_s
-    if row.protective_s is None and row.level is not None and row.level >= ProtectionLevel.PROTECTIVE:
-        return row.acted_s  # the minimal risk condition without the mode's own gate
-    return row.protective_s
 
 
 def scopes_of(rows: Sequence[Row]) -> list[tuple[Scope, Callable[[Row], bool]]]:
@@ -126,42 +115,41 @@ def results_of(plan: Plan, rows: Sequence[Row]) -> list[ArmResult]:
         plan: of the campaign.
         rows: what was run of it.
     """
-    reference = plan.spec.reference_arm
-    partner = {_seat(r): r for r in rows if reference is not None and r.arm == reference.id and r.ok}
-    harmless = {id_ for id_, s in plan.scenarios.items() if s.expect == "none"}
+    outcomes = Outcomes(plan, rows)
+    first = next((a.id for a in plan.spec.arms if a.kind == "shadow"), "")
     found = []
     for scope, belongs in scopes_of(rows):
-        inside = [r for r in rows if belongs(r)]
-        for arm in plan.spec.arms:
-            mine = [r for r in inside if r.arm == arm.id]
-            if mine:
-                pairs = [(partner[_seat(r)], r) for r in mine if r.ok and _seat(r) in partner]
-                found.append(_judged(scope, arm, mine, None if reference is None else pairs, reference, harmless))
+        by_arm: dict[str, list[Row]] = {}
+        for r in rows:
+            if belongs(r):
+                by_arm.setdefault(r.arm, []).append(r)
+        shadow = first, by_arm.get(first, [])
+        found += [_judged(scope, a, by_arm[a.id], outcomes, shadow) for a in plan.spec.arms if a.id in by_arm]
     return found
 
 
-def _seat(row: Row) -> tuple[str, int, int, str]:
-    """What the arms share: scenario, point, replicate and fault."""
-    return row.scenario, row.point, row.replicate, row.fault
+def forecasts(rows: Sequence[Row]) -> list[Row]:
+    """The runs whose highest P is known, and what happened."""
+    return [r for r in rows if r.ok and r.peak_p is not None]
 
 
 def _judged(
-    scope: Scope,
-    arm: ArmEntry,
-    mine: Sequence[Row],
-    pairs: Sequence[tuple[Row, Row]] | None,
-    reference: ArmEntry | None,
-    harmless: set[str],
+    scope: Scope, arm: ArmEntry, mine: Sequence[Row], outcomes: Outcomes, first: tuple[str, Sequence[Row]]
 ) -> ArmResult:
+    reference = outcomes.reference
     runs = [r for r in mine if r.ok]
-    exposed = {r.scenario for r in mine} - harmless or {r.scenario for r in mine}
+    exposed = {r.scenario for r in mine} - outcomes.harmless or {r.scenario for r in mine}
     counted = [r for r in runs if r.scenario in exposed]
-    both = [(a, b) for a, b in pairs or () if b.scenario in exposed]
+    pairs = [(a, r) for r in runs if (a := outcomes.partner(r)) is not None]
+    both = [(a, b) for a, b in pairs if b.scenario in exposed]
     hurt = [(a, b) for a, b in both if a.accident]
-    calm = [(a, b) for a, b in pairs or () if a.event_s is None]
-    leads = [a.accident_s - t for a, b in hurt if (t := acted_s(b, arm)) is not None and a.accident_s is not None]
-    false = per_hour(sum(acted_s(b, arm) is not None for _, b in calm), sum(b.end_s or 0.0 for _, b in calm) / 3600.0)
+    calm = [r for r in runs if outcomes.calm(r)]
+    false = per_hour(sum(bool(outcomes.false(r)) for r in calm), sum(r.end_s or 0.0 for r in calm) / 3600.0)
+    slowed = [r for r in calm if outcomes.reduced(r) is not None]
+    safe = [t for r in runs if (t := outcomes.safe_after_s(r)) is not None]
     itself = reference is None or arm.id == reference.id
+    told = forecasts(runs) if arm.kind == "shadow" else []
+    p, happened = [r.peak_p or 0.0 for r in told], [bool(r.accident) for r in told]
     return ArmResult(
         scope,
         arm.id,
@@ -171,24 +159,34 @@ def _judged(
         sum(bool(r.accident) for r in runs if r.scenario not in exposed),
         None if itself else paired_difference([bool(a.accident) for a, _ in both], [bool(b.accident) for _, b in both]),
         wilson(sum(not b.accident for _, b in hurt), len(hurt)),
-        sum(bool(b.accident) and not a.accident for a, b in pairs or ()),
-        tuple(sorted(leads)),
-        None if pairs is None or arm.kind == "none" else false,
-        _brier(runs) if arm.kind == "shadow" else None,
+        sum(bool(b.accident) and not a.accident for a, b in pairs),
+        tuple(sorted(t for _, r in hurt if (t := outcomes.lead_s(r)) is not None)),
+        false if reference is not None and arm.judged else None,
+        Times(tuple(sorted(safe))) if safe else None,
+        share_of_time([r.reduced_s or 0.0 for r in slowed], [r.end_s or 0.0 for r in slowed]) if slowed else None,
+        brier(p, happened),
+        reliability(p, happened),
+        _told_apart(told, p, happened, None if arm.id == first[0] else first),
+        len({r.scenario for r in mine}),
     )
 
 
-def _brier(rows: Iterable[Row]) -> Brier | None:
-    told = [(r.peak_p, float(bool(r.accident))) for r in rows if r.peak_p is not None]
-    if not told:
-        return None
-    n = len(told)
-    errors = [(p - y) ** 2 for p, y in told]
-    score = sum(errors) / n
-    rate = sum(y for _, y in told) / n
-    spread = math.sqrt(sum((e - score) ** 2 for e in errors) / (n - 1) / n) if n > 1 else math.nan
-    half = 1.96 * spread if n > 1 else 1.0
-    return Brier(score, max(score - half, 0.0), min(score + half, 1.0), rate * (1.0 - rate), n)
+def _told_apart(
+    told: Sequence[Row], p: Sequence[float], happened: Sequence[bool], first: tuple[str, Sequence[Row]] | None
+) -> Discrimination | None:
+    """How well P discriminates, and how that differs from the first shadow arm, on the runs that both have."""
+    found = discrimination(p, happened)
+    if found is None or first is None:
+        return found
+    before = {seat_of(r): r.peak_p or 0.0 for r in forecasts(first[1])}
+    both = [r for r in told if seat_of(r) in before]
+    difference = auc_difference(
+        first[0],
+        [r.peak_p or 0.0 for r in both],
+        [before[seat_of(r)] for r in both],
+        [bool(r.accident) for r in both],
+    )
+    return msgspec.structs.replace(found, difference=difference)
 
 
 def shown(results: Sequence[ArmResult]) -> list[ArmResult]:

@@ -31,7 +31,16 @@ __all__ = [
 ArmKind: TypeAlias = Literal["none", "shadow", "on", "random", "always"]
 Sampler: TypeAlias = Literal["grid", "monte-carlo", "latin-hypercube", "sobol"]
 Metric: TypeAlias = Literal[
-    "accidents", "difference", "prevented", "lead-time", "false-interventions", "brier", "failures"
+    "accidents",
+    "difference",
+    "prevented",
+    "lead-time",
+    "safe-state",
+    "false-interventions",
+    "reduced-speed",
+    "brier",
+    "discrimination",
+    "failures",
 ]
 METRICS: tuple[Metric, ...] = get_args(Metric)
 _NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*", re.ASCII)
@@ -132,6 +141,11 @@ class ArmEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def judged(self) -> bool:
         """Whether a supervisor runs."""
         return self.kind in ("shadow", "on")
+
+    @property
+    def foreshock(self) -> bool:
+        """Whether it stands for Foreshock: it acts, and by protection levels, which its model of risk gives."""
+        return self.kind == "on" and self.acts_by == "level"
 
     def __post_init__(self) -> None:
         place = f"arms.{self.id}"

@@ -21,17 +21,18 @@ def results_json(results: Sequence[ArmResult]) -> list[dict[str, Any]]:
 
 
 def print_results(spec: CampaignSpec, results: Sequence[ArmResult]) -> None:
-    """The table of arms, overall and per mode, with the metrics that the campaign asks for."""
+    """The table of arms, overall and per mode; of the campaign's metrics those that fit a line, the report has all."""
     columns = {
         "accidents": ("accidents",),
         "difference": ("difference", "p"),
         "prevented": ("prevented", "caused"),
         "lead-time": ("lead (s)",),
-        "false-interventions": ("false per hour",),
+        "false-interventions": ("false/h",),
+        "reduced-speed": ("slow",),
         "brier": ("Brier",),
         "failures": ("no result",),
     }
-    wanted = [c for metric in spec.metrics for c in columns[metric]]
+    wanted = [c for metric in spec.metrics for c in columns.get(metric, ())]
     printed = [(r, _cells(r)) for r in shown(results)]
     # a column that says nothing takes the room of one that does
     wanted = [c for c in wanted if any(cells[c] not in ("–", "0") for _, cells in printed)]
@@ -51,7 +52,8 @@ def _cells(r: ArmResult) -> Mapping[str, str]:
         "prevented": f"{r.prevented.k}/{r.prevented.n}" if d is not None else "–",
         "caused": str(r.caused) if d is not None else "–",
         "lead (s)": f"{lead[1]:.2f}" if lead is not None else "–",
-        "false per hour": frequency(r.false),
+        "false/h": frequency(r.false),
+        "slow": f"{100 * r.reduced.share:.0f}%" if r.reduced is not None else "–",
         "Brier": f"{r.brier.score:.3f}" if r.brier is not None else "–",
         "no result": str(r.failures),
     }

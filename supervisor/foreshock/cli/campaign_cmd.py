@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 import msgspec
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
 from foreshock.campaign.again import Again, case_of
@@ -20,7 +20,7 @@ from foreshock.campaign.compare import compare as compare_campaigns
 from foreshock.campaign.engine import Campaign, Estimate, Progress, begin, execute, refuse_changes, reopen
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.plan import Case
-from foreshock.campaign.report import write_results
+from foreshock.campaign.report import ranking_of, write_results
 from foreshock.campaign.results import ArmResult
 from foreshock.campaign.spec import campaign_schema, load_campaign, shipped
 from foreshock.cli._campaign_results import print_changes, print_results, results_json
@@ -110,14 +110,23 @@ def status(folder: Path, as_json: bool) -> int:
 
 @campaign.command()
 @folder_argument
+@click.option(
+    "--markdown",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write which arm wins where, and where Foreshock loses, as Markdown.",
+)
 @json_option
-def report(folder: Path, as_json: bool) -> int:
-    """Write runs.parquet, results.parquet and report.html into DIR, and print the results.
+def report(folder: Path, markdown: Path | None, as_json: bool) -> int:
+    """Write report.html and the Parquet files into DIR, and print the results.
 
     Also of a campaign that is not complete.
     """
     found, _ = reopen(folder, Registry())
     results, paths = write_results(found)
+    if markdown is not None:
+        markdown.write_text(ranking_of(found, results))
+        paths.append(markdown)
     if as_json:
         emit({"results": results_json(results), "files": [str(p) for p in paths]})
         return OK
@@ -135,7 +144,7 @@ def compare(first: Path, second: Path, as_json: bool) -> int:
     """Hold campaign B against campaign A, run by run where they share runs.
 
     Exit code 1 if a result of B is significantly worse: more accidents or false interventions, less lead time, more
-    runs without a result.
+    time at reduced speed, more runs without a result.
     """
     registry = Registry()
     sides = [reopen(folder, registry)[0] for folder in (first, second)]
@@ -206,8 +215,7 @@ def _print_again(again: Again, changed: list[str]) -> None:
 
 def _go(found: Campaign, workers: int, dask: str | None, as_json: bool, *, retry: bool = False) -> int:
     runner = run_stream if dask is None else dask_runner(dask, found.plan)
-    total = len(found.plan.cases)
-    with _bar(total, as_json) as (estimated, told):
+    with _bar(len(found.plan.cases), len(found.rows()), as_json) as (estimated, told):
         complete = execute(found, workers, runner=runner, estimated=estimated, told=told, retry=retry)
     rows = found.rows()
     state = _state(found, rows, [])
@@ -261,21 +269,23 @@ def _print_state(state: dict[str, Any], rows: list[Row]) -> None:
 
 
 @contextmanager
-def _bar(total: int, quiet: bool) -> Iterator[tuple[Callable[[Estimate], None], Callable[[Progress], None]]]:
+def _bar(
+    total: int, known: int, quiet: bool
+) -> Iterator[tuple[Callable[[Estimate], None], Callable[[Progress], None]]]:
     """A progress bar with rate, time left and failures; and the estimate before the bulk of it."""
     with Bar(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[rate]:.1f} runs/s"),
-        TimeElapsedColumn(),
         TimeRemainingColumn(),
+        TextColumn("left"),
         TextColumn("{task.fields[failed]} failed"),
         console=notes,
         transient=True,
         disable=quiet,
     ) as bar:
-        task = bar.add_task("campaign", total=total, failed=0, rate=0.0)
+        task = bar.add_task("campaign", total=total, completed=known, failed=0, rate=0.0)
 
         def estimated(e: Estimate) -> None:
             if not quiet:

@@ -30,12 +30,16 @@ EXTRAS = {
     "proximity": ("fcl", "pinocchio"),
     "grip": ("filterpy",),
     "fmi": ("fmpy",),
+    "mujoco": ("mujoco", "pinocchio", "av", "PIL"),
     "zenoh": ("zenoh", "mcap", "rosbags"),
     "report": ("jinja2", "matplotlib"),
     "analysis": ("SALib", "sklearn", "statsmodels", "pyarrow"),
-    "campaign": ("jinja2", "matplotlib", "pyarrow", "scipy"),
+    "campaign": ("jinja2", "matplotlib", "pyarrow", "scipy", "sklearn"),
 }
 COMPILERS = ("cc", "gcc", "clang")
+
+SILENT_S = 1.0
+"""No robot streams more slowly."""
 
 
 class Finding(msgspec.Struct, frozen=True):
@@ -166,9 +170,9 @@ def _link(run: RunConfig, base: Path) -> Iterator[Finding]:
             age = s.source_age_s
             rate = s.counts.samples / status.uptime_s if status.uptime_s else 0.0
             said = f"{rate:.0f} a second" + ("" if age is None else f", {age * 1e3:.0f} ms old")
-            yield Finding(
-                channel, s.counts.samples > 0, said + (f"; {s.counts.last_fault}" if s.counts.last_fault else "")
-            )
+            silent = s.arrival_age_s is None or s.arrival_age_s > SILENT_S
+            said += f", silent for more than {SILENT_S:g} s" if silent else ""
+            yield Finding(channel, not silent, said + (f"; {s.counts.last_fault}" if s.counts.last_fault else ""))
     except ForeshockError as e:
         yield Finding("link", False, str(e))
     finally:

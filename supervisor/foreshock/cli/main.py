@@ -18,10 +18,12 @@ from foreshock.cli.demo_cmd import demo
 from foreshock.cli.detectors_cmd import detectors
 from foreshock.cli.doctor_cmd import doctor
 from foreshock.cli.events_cmd import events
+from foreshock.cli.falsify_cmd import falsify
 from foreshock.cli.gates_cmd import gates
 from foreshock.cli.journal_cmd import journal
 from foreshock.cli.operator_cmd import reset
 from foreshock.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, TERMINATED, emit, notes
+from foreshock.cli.pictures_cmd import pictures
 from foreshock.cli.policies_cmd import policies
 from foreshock.cli.replay_cmd import replay
 from foreshock.cli.run_cmd import run
@@ -76,8 +78,8 @@ def cli() -> None:
 
 
 COMMANDS = (
-    calibrate, campaign, config, demo, detectors, doctor, events, gates, journal, policies, replay, reset, run,
-    scenarios, security, sensitivity, simulate, taxonomy, top, twin,
+    calibrate, campaign, config, demo, detectors, doctor, events, falsify, gates, journal, pictures, policies, replay,
+    reset, run, scenarios, security, sensitivity, simulate, taxonomy, top, twin,
 )  # fmt: skip
 for command in COMMANDS:
     cli.add_command(command)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import click
 
 from foreshock.cli.output import OK, console, emit, notes
 from foreshock.errors import BadInputError
-from foreshock.live import LiveSupervisor, load_run
+from foreshock.live import LiveSupervisor, load_run, watch_log
 from foreshock.records import Decision, ProtectionLevel
 
 __all__ = ["run"]
@@ -28,7 +29,8 @@ def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool
     """
     if journal is not None and journal.exists():
         raise BadInputError("--journal", f"{journal} exists; a journal is never overwritten", "; choose another name")
-    live = LiveSupervisor(load_run(config), config.parent, journal=journal)
+    loaded = load_run(config)
+    live = LiveSupervisor(loaded, config.parent, journal=journal, denied=watch_log(loaded.link))
     stop = threading.Event()
     last = ProtectionLevel.NORMAL
     timer = threading.Timer(seconds, stop.set) if seconds is not None else None
@@ -37,7 +39,8 @@ def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool
         nonlocal last
         if decision.level is not last:
             modes = ", ".join(m for m, level in decision.levels.items() if level)
-            notes.print(f"level {decision.level.name.lower().replace('_', '-')} {modes}", markup=False)
+            said = f"level {decision.level.name.lower().replace('_', '-')} {modes}".rstrip()
+            notes.print(said, markup=False)
             last = decision.level
 
     if not as_json:
@@ -46,6 +49,8 @@ def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool
     if timer is not None:
         timer.daemon = True
         timer.start()
+    gc.collect()
+    gc.freeze()  # a full collection would walk through all that set-up made, in the middle of a tick
     try:
         final = live.run(stop, ticked)
     finally:

@@ -24,7 +24,7 @@ def scenarios() -> None:
 def list_(as_json: bool) -> None:
     """List the scenarios of the installed plugins."""
     registry = Registry()
-    known = scenario_ids(registry)
+    known = scenario_ids(registry, variants=True)
     left_out((*registry.load_all(), *broken_scenarios(registry)))
     if as_json:
         emit([{"id": s.id, "mode": s.mode, "expect": s.expect, "title": s.title} for s in known.values()])

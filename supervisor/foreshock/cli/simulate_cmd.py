@@ -18,25 +18,28 @@ from foreshock.session.isolated import Job, run_one
 from foreshock.session.run import Arm, Run
 from foreshock.session.scenario import find_scenario
 
-__all__ = ["simulate", "timeline"]
+__all__ = ["simulate", "summary", "timeline", "values"]
 
 
-def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, float]:
-    values = {}
+def values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, float]:
+    """NAME=NUMBER by name."""
+    found = {}
     for item in given:
         name, equals, number = item.partition("=")
         try:
-            values[name] = float(number)
+            found[name] = float(number)
         except ValueError:
             equals = ""
         if not equals:
             raise click.BadParameter(f"{item!r} is not NAME=NUMBER")
-    return values
+    return found
 
 
 @click.command()
 @click.argument("scenario")
-@click.option("--twin", help="Kind of twin, or KIND:ENDPOINT; the scenario's own by default.")
+@click.option(
+    "--twin", help="Kind of twin, or KIND:ENDPOINT; the scenario's variant on it if there is one; its own by default."
+)
 @click.option(
     "--supervisor",
     "arm",
@@ -46,9 +49,9 @@ def _values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> di
     help="Judges and acts, judges only, or off.",
 )
 @click.option("--policy", help="Use this policy instead of the scenario's.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of all randomness.")
+@click.option("--seed", type=click.IntRange(0), help="Of all randomness; the scenario's own (0) by default.")
 @click.option(
-    "--set", "parameters", multiple=True, callback=_values, metavar="NAME=NUMBER", help="Set a parameter of the twin."
+    "--set", "parameters", multiple=True, callback=values, metavar="NAME=NUMBER", help="Set a parameter of the twin."
 )
 @click.option("--duration", type=float, help="Simulated time in s; the scenario's own by default.")
 @click.option(
@@ -64,7 +67,7 @@ def simulate(
     twin: str | None,
     arm: Arm,
     policy: str | None,
-    seed: int,
+    seed: int | None,
     parameters: dict[str, float],
     duration: float | None,
     timeout: float | None,
@@ -77,16 +80,18 @@ def simulate(
     The run takes place in a watched process: an FMU that hangs or crashes ends in a message, not in this program.
     """
     registry = Registry()
-    found = find_scenario(scenario, registry).with_(parameters, policy)
+    kind, _, endpoint = (twin or "").partition(":")
+    found = find_scenario(scenario, registry, kind).with_(parameters, policy)
     if twin is not None and twin != found.twin["kind"]:
-        kind, _, endpoint = twin.partition(":")
         registry.twin(kind, "--twin")
         found = msgspec.structs.replace(found, twin={"kind": kind, **({"endpoint": endpoint} if endpoint else {})})
     if duration is not None:
         found = msgspec.structs.replace(found, duration_s=duration)
     if journal is not None and arm == "off":
         raise BadInputError("--journal", "nothing decides with --supervisor off", "; take shadow")
-    job = Job(found, arm, seed, journal="" if journal is None else str(journal.resolve()))
+    job = Job(
+        found, arm, found.seed if seed is None else seed, journal="" if journal is None else str(journal.resolve())
+    )
     with Progress(console=notes, transient=True, disable=as_json) as progress:
         progress.add_task(f"{found.id} ({found.duration_s:g} s)", total=None)
         run = run_one(job, timeout)

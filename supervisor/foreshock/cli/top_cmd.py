@@ -34,7 +34,9 @@ def ask(session: Any, key: str, payload: bytes = b"", timeout_s: float = 2.0) ->
             raise BadInputError(key, reply.err.payload.to_string())
         answer: bytes = reply.ok.payload.to_bytes()
         return answer
-    raise BadInputError(key, f"no answer within {timeout_s:g} s", "; is a supervisor running there?")
+    raise BadInputError(
+        key, f"no answer within {timeout_s:g} s", "; is a supervisor running there, and may you ask this?"
+    )
 
 
 @click.command()
@@ -74,7 +76,10 @@ def view(s: Status) -> Group:
         (f" {s.robot} ", "bold"),
         (f" {s.level or 'no tick yet'} ".replace("_", "-"), f"reverse {colour}"),
         f"  trust {s.trust:.2f}  control {s.control_trust:.2f}   ",
-        ("may move" if s.motion_permitted else f"may NOT move {s.withheld}", "green" if s.motion_permitted else "red"),
+        (
+            "may move" if s.motion_permitted else "may NOT move" + (f": {s.withheld}" if s.withheld else ""),
+            "green" if s.motion_permitted else "red",
+        ),
         f"\n up {s.uptime_s:.0f} s, tick {s.tick}: {median:.2f} ms median, {p99:.2f} p99, {most:.2f} most, "
         f"{s.overruns} overruns, {s.leases} leases",
     )
@@ -103,10 +108,17 @@ def view(s: Status) -> Group:
     health = _grid("not ok", "")
     for source, why in s.health.items():
         health.add_row(source, why)
+    away = _grid("turned away", "times", "last")
+    for r in s.refused:
+        away.add_row(f"no connection: {r.reason}", str(r.count), f"{r.age_s:.0f} s ago")
+    for d in s.denied:
+        away.add_row(f"{d.name or d.zid}: {d.what} {d.key}", str(d.count), f"{d.age_s:.0f} s ago")
     two = Table.grid(expand=True, padding=(0, 1))
     two.add_row(Panel(modes, title="trust by mode"), Panel(now, title="now"))
-    last = Panel(health, title="health", border_style="yellow") if s.health else Text()
-    return Group(head, two, Panel(streams, title="streams"), last)
+    last = [Panel(health, title="health", border_style="yellow")] if s.health else []
+    if s.refused or s.denied:
+        last.append(Panel(away, title="link", border_style="red"))
+    return Group(head, two, Panel(streams, title="streams"), *last)
 
 
 def _grid(*columns: str) -> Table:

@@ -82,7 +82,7 @@ class Guard:
         self._ended = threading.Event()
         self._threads: list[threading.Thread] = []
         self._session: Any = None
-        self._epoch = -1
+        self._told_epoch = -1
         self._done: dict[int, bool] = {}
         self._newest: dict[str, int] = {}
         self.counts = GuardCounts()
@@ -150,7 +150,6 @@ class Guard:
         lease = unpack_lease(data)
         with self._lock:
             if self._lease.receive(lease):
-                self._epoch = max(self._epoch, lease.epoch)
                 self.counts.leases += 1
                 self._renewed.set()
             else:
@@ -159,12 +158,12 @@ class Guard:
     def _take_intervention(self, data: bytes) -> None:
         numbered = unpack_intervention(data)
         epoch, number, intervention = numbered.epoch, numbered.number, numbered.intervention
-        if epoch < self._epoch:
-            self.counts.fenced += 1
-            return
-        if epoch > self._epoch:
-            with self._lock:
-                self._epoch = epoch
+        with self._lock:
+            if not self._lease.fence(epoch):
+                self.counts.fenced += 1
+                return
+        if epoch != self._told_epoch:  # another supervisor, which counts from 1 again
+            self._told_epoch = epoch
             self._done, self._newest = {}, {}
         if number in self._done:
             self.counts.repeated += 1

@@ -55,6 +55,13 @@ class MotionGuard:
         self._asked = {n: t for n, t in self._asked.items() if n > lease.nonce}
         return True
 
+    def fence(self, epoch: int) -> bool:
+        """A supervisor of this epoch was heard: older ones are refused from now on; False if it is one of them."""
+        if epoch < self._epoch:
+            return False
+        self._epoch = epoch
+        return True
+
     @property
     def until_ns(self) -> int:
         """When the permission ends, on the guard's clock; -1 before the first lease."""

@@ -1,6 +1,7 @@
 """A supervisor that runs beside a robot, over Zenoh (docs/live.md)."""
 
 from foreshock.live._config import RunConfig, load_run, parse_run
+from foreshock.live._denied import Denied, DeniedPeers, Refused, watch_log
 from foreshock.live._run import LiveSupervisor
 from foreshock.live._security import access_rules, init_security
 from foreshock.live._serve import FreeRunning, SteppedServer
@@ -9,10 +10,13 @@ from foreshock.live._settings import JournalSettings, LiveSettings
 from foreshock.live._status import Status
 
 __all__ = [
+    "Denied",
+    "DeniedPeers",
     "FreeRunning",
     "JournalSettings",
     "LiveSettings",
     "LiveSupervisor",
+    "Refused",
     "ResetRequest",
     "RunConfig",
     "Status",
@@ -21,4 +25,5 @@ __all__ = [
     "init_security",
     "load_run",
     "parse_run",
+    "watch_log",
 ]

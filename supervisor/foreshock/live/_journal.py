@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import glob
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -15,19 +18,27 @@ from foreshock.records import Decision, Sample
 __all__ = ["SegmentedJournal"]
 
 
+SEGMENT = re.compile(r"\d+-\d{5,}\.mcap")
+"""Epoch and number, after the robot's name."""
+
+
 class SegmentedJournal:
     """Implements foreshock.journal.Journal.
 
     Args:
         folder: of the files.
-        stem: how their names begin; it holds the epoch, so that two runs never meet.
+        robot: whose journals they are.
+        epoch: of the supervisor, so that the files of two runs never meet.
         head: what a replay needs.
         settings: when a new segment begins, and what is kept.
         today_s: age of the oldest file that is kept is counted from here (s since 1970).
     """
 
-    def __init__(self, folder: Path, stem: str, head: Head, settings: JournalSettings, today_s: float) -> None:
-        self._folder, self._stem, self._head, self._settings = folder, stem, head, settings
+    def __init__(
+        self, folder: Path, robot: str, epoch: int, head: Head, settings: JournalSettings, today_s: float
+    ) -> None:
+        self._folder, self._robot, self._stem = folder, robot, f"{robot}-{epoch}"
+        self._head, self._settings = head, settings
         self._today_s = today_s
         self._segment = 0
         self._begun_ns = head.began_ns
@@ -62,13 +73,18 @@ class SegmentedJournal:
 
     def _retain(self) -> None:
         """Remove the oldest files beyond size and age, never the one that is written."""
-        files = sorted(self._folder.glob("*.mcap"), key=lambda p: (p.stat().st_mtime, p.name))
-        total = sum(p.stat().st_size for p in files)
-        for path in files:
+        found: list[tuple[float, Path, int]] = []
+        # of this robot's live runs only: whatever else lies in the folder is somebody's
+        for path in self._folder.glob(f"{glob.escape(self._robot)}-*.mcap"):
+            if SEGMENT.fullmatch(path.name.removeprefix(f"{self._robot}-")):
+                with suppress(FileNotFoundError):  # somebody else tidies up, too
+                    stat = path.stat()
+                    found.append((stat.st_mtime, path, stat.st_size))
+        total = sum(size for _, _, size in found)
+        for modified_s, path, size in sorted(found):
             if path == self._file.path:
                 continue
-            old = self._today_s - path.stat().st_mtime > self._settings.max_age_s
-            if not old and total <= self._settings.max_bytes:
+            if self._today_s - modified_s <= self._settings.max_age_s and total <= self._settings.max_bytes:
                 return
-            total -= path.stat().st_size
-            path.unlink()
+            total -= size
+            path.unlink(missing_ok=True)

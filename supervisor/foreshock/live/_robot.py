@@ -9,6 +9,7 @@ import msgspec
 from foreshock.errors import WireError
 from foreshock.guard._cdr import (
     Numbered,
+    Request,
     pack_intervention,
     pack_lease,
     unpack_ack,
@@ -25,11 +26,19 @@ RING = 64
 
 
 class Pending(msgspec.Struct):
-    """An intervention that no guard has acknowledged: first sent, last sent."""
+    """An intervention that not every guard has acknowledged: first sent, last sent, and who has acknowledged it."""
 
     numbered: Numbered
     first_ns: int
     last_ns: int
+    by: set[str]
+
+
+class Asking(msgspec.Struct):
+    """A guard: when it was heard last, and the nonce of its last request."""
+
+    heard_ns: int
+    nonce: int
 
 
 class RobotLink:
@@ -54,13 +63,14 @@ class RobotLink:
             )
 
         self._settings, self._epoch = settings, epoch
+        self._ttl_ns = round(settings.ttl_s * 1e9)
         self._lease, self._intervention = publisher("lease"), publisher("intervention")
         self._requests = session.declare_subscriber(keys.service("lease_request"), zenoh.handlers.RingChannel(RING))
         self._acks = session.declare_subscriber(keys.service("ack"), zenoh.handlers.RingChannel(RING))
         self._number = 0
         self._pending: dict[str, Pending] = {}
         self._active: dict[str, Numbered] = {}
-        self._guards: dict[str, int] = {}
+        self._guards: dict[str, Asking] = {}
         self.unknown: dict[str, int] = {}
         self.garbage = 0
         self.granted = 0
@@ -68,15 +78,15 @@ class RobotLink:
     @property
     def guards(self) -> dict[str, int]:
         """When each guard was heard last, by name, on the supervisor's timeline."""
-        return dict(self._guards)
+        return {name: guard.heard_ns for name, guard in self._guards.items()}
 
     def overdue(self, now_ns: int) -> list[str]:
-        """Actions that no guard has acknowledged in time: the robot may not know of them."""
+        """Actions that a guard has not acknowledged in time: the robot may not know of them."""
         limit_ns = round(self._settings.ack_s * 1e9)
         return [action for action, p in self._pending.items() if now_ns - p.first_ns > limit_ns]
 
     def tell(self, decision: Decision, now_ns: int) -> None:
-        """Send what changed, and again what nobody has acknowledged."""
+        """Send what changed, and again what a guard has not acknowledged."""
         for change in decision.changes:
             self._send(change, now_ns)
         again_ns = round(self._settings.resend_s * 1e9)
@@ -94,7 +104,7 @@ class RobotLink:
             self._active.pop(change.action, None)
         # a newer word on an action takes the place of an older one, whose time to be heard runs on
         before = self._pending.get(change.action)
-        self._pending[change.action] = Pending(numbered, now_ns if before is None else before.first_ns, now_ns)
+        self._pending[change.action] = Pending(numbered, now_ns if before is None else before.first_ns, now_ns, set())
         self._intervention.put(pack_intervention(numbered))
 
     def hear(self, now_ns: int) -> None:
@@ -102,7 +112,7 @@ class RobotLink:
         for _ in range(RING):
             raw = self._acks.try_recv()
             if raw is None:
-                return
+                break
             try:
                 ack = unpack_ack(raw.payload.to_bytes())
             except WireError:
@@ -110,15 +120,20 @@ class RobotLink:
                 continue
             if ack.epoch != self._epoch:
                 continue
-            self._guards[ack.guard] = now_ns
-            for action, pending in list(self._pending.items()):
-                if pending.numbered.number == ack.number:
-                    del self._pending[action]
+            if ack.guard not in self._guards:
+                continue  # who never asked for a lease is no guard
+            self._guards[ack.guard].heard_ns = now_ns
+            for action, pending in self._pending.items():
+                if pending.numbered.number == ack.number and ack.guard not in pending.by:
+                    pending.by.add(ack.guard)
                     if not ack.understood:
                         self.unknown[action] = self.unknown.get(action, 0) + 1
+        # one that is silent for longer than the time to live holds no lease
+        present = {name for name, guard in self._guards.items() if now_ns - guard.heard_ns <= self._ttl_ns}
+        self._pending = {a: p for a, p in self._pending.items() if not p.by or not p.by >= present}
 
     def grant(self, supervisor: Supervisor, now_ns: int, permitted: bool) -> None:
-        """Answer requests for the lease; a guard that is new is told of everything that holds.
+        """Answer requests for the lease; a guard that is new, or has begun again, is told of everything that holds.
 
         Args:
             supervisor: that grants.
@@ -134,13 +149,20 @@ class RobotLink:
             except WireError:
                 self.garbage += 1
                 continue
-            if request.guard not in self._guards:
-                for numbered in self._active.values():
-                    self._intervention.put(pack_intervention(numbered))
-                if len(self._guards) >= RING:
-                    del self._guards[min(self._guards, key=lambda g: self._guards[g])]
-            self._guards[request.guard] = now_ns
+            self._meet(request, now_ns)
             lease = supervisor.lease(request.nonce, request.guard_ns, now_ns, self._settings.ttl_s)
             if permitted and lease is not None:
                 self.granted += 1
                 self._lease.put(pack_lease(lease))
+
+    def _meet(self, request: Request, now_ns: int) -> None:
+        known = self._guards.get(request.guard)
+        if known is None and len(self._guards) >= RING:
+            del self._guards[min(self._guards, key=lambda g: self._guards[g].heard_ns)]
+        self._guards[request.guard] = Asking(now_ns, request.nonce)
+        if known is not None and request.nonce > known.nonce and now_ns - known.heard_ns <= self._ttl_ns:
+            return
+        for action, numbered in self._active.items():
+            pending = self._pending.setdefault(action, Pending(numbered, now_ns, now_ns, set()))
+            pending.by.discard(request.guard)
+            self._intervention.put(pack_intervention(numbered))

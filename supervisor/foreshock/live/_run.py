@@ -17,7 +17,9 @@ from foreshock.errors import BadInputError, ConfigError, nearest
 from foreshock.journal import DigestJournal
 from foreshock.link import keys_of, open_link, ros_tokens
 from foreshock.live._config import RunConfig
+from foreshock.live._denied import DeniedPeers
 from foreshock.live._handshake import Handshakes
+from foreshock.live._intake import Intake
 from foreshock.live._journal import SegmentedJournal
 from foreshock.live._publish import decision_bytes
 from foreshock.live._robot import RobotLink
@@ -25,7 +27,7 @@ from foreshock.live._services import Services
 from foreshock.live._status import Status, TickTimes, stream_status
 from foreshock.live._stream import Stream
 from foreshock.recording import Head, McapJournal
-from foreshock.records import Decision, ProtectionLevel, Sample
+from foreshock.records import Decision, ProtectionLevel
 from foreshock.registry import Registry
 from foreshock.supervisor import Supervisor
 from foreshock.wire import ROS_NAMES, Codec, typestore
@@ -43,6 +45,7 @@ class LiveSupervisor:
         base: folder that relative paths of the configuration start from.
         registry: of plugins.
         journal: one file to record everything in, instead of the folder that the configuration names.
+        denied: who was turned away, if somebody watches the log; see watch_log.
 
     Raises:
         BadInputError: the configuration does not fit, or the link cannot be opened.
@@ -54,6 +57,7 @@ class LiveSupervisor:
         base: Path | None = None,
         registry: Registry | None = None,
         journal: Path | None = None,
+        denied: DeniedPeers | None = None,
     ) -> None:
         base = base or Path()
         self._run, self.epoch = run, wall_ns()
@@ -69,6 +73,7 @@ class LiveSupervisor:
                 Stream(self._session, keys, channel, cls, codec, run.live.max_skew_s)
                 for channel, cls in sorted(channels.items())
             ]
+            self._intake = Intake(self._streams, self.supervisor.period_ns)
             self._robot = RobotLink(self._session, keys, run.live, self.epoch)
             self._decisions = self._session.declare_publisher(keys.service("decision"))
             self._services = Services(self._session, keys)
@@ -80,6 +85,9 @@ class LiveSupervisor:
         except BaseException:
             self._session.close()
             raise
+        self._denied = denied
+        if denied is not None:
+            denied.names = self._names
         self._base = base
         self._journal_file = journal
         self._journal: SegmentedJournal | McapJournal | None = None
@@ -123,9 +131,7 @@ class LiveSupervisor:
 
         Nobody may move then, since no lease is granted.
         """
-        samples: list[Sample] = []
-        for stream in self._streams:
-            samples += stream.drain(now_ns)
+        samples = self._intake.drain(now_ns)
         if self._missing:
             self._missing = self._silent()
             if self._missing:
@@ -174,7 +180,7 @@ class LiveSupervisor:
 
     def status(self) -> Status:
         """What there is to say, after the last tick."""
-        now_ns, d = monotonic_ns(), self._decision
+        now_ns, d, log = monotonic_ns(), self._decision, self._denied
         overdue = self._robot.overdue(now_ns)
         withheld = f"no guard has acknowledged {', '.join(overdue)}" if overdue else ""
         if doubted := self._doubted():
@@ -207,13 +213,19 @@ class LiveSupervisor:
             if d is None
             else tuple(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in d.precursors if p.phase != "cleared"),
             streams={s.channel: stream_status(s, now_ns) for s in self._streams},
-            health={**faults, **self._health},
+            health={**faults, **self._health, **({"link log": log.fault} if log is not None and log.fault else {})},
             peers=self._services.peers(),
             links=tuple(
                 sorted(f"{x.dst} {x.auth_identifier or 'without a certificate'}" for x in self._session.info.links())
             ),
+            denied=() if log is None else log.denied(now_ns),
+            refused=() if log is None else log.refused(now_ns),
             journal="" if self._journal is None else str(self._journal.path),
         )
+
+    def _names(self) -> dict[str, str]:
+        """Names in the certificates of the peers that are connected, by Zenoh id."""
+        return {str(x.zid): x.auth_identifier or "" for x in self._session.info.links()}
 
     def close(self) -> None:
         """End the link, the journal and child processes; idempotent."""
@@ -241,8 +253,8 @@ class LiveSupervisor:
             return McapJournal(self._journal_file, head)
         if not settings.folder:
             return None
-        stem = f"{self._run.config.supervisor.robot}-{self.epoch}"
-        return SegmentedJournal(base / settings.folder, stem, head, settings, self.epoch / NS_PER_S)
+        robot = self._run.config.supervisor.robot
+        return SegmentedJournal(base / settings.folder, robot, self.epoch, head, settings, self.epoch / NS_PER_S)
 
 
 def _channels(run: RunConfig, supervisor: Supervisor) -> dict[str, type]:

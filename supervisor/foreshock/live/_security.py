@@ -30,14 +30,17 @@ def access_rules(robot: str, twins: Mapping[str, Sequence[str]]) -> tuple[Access
         twins: channels below the robot's (key expressions) that each twin may write, by name of its certificate.
     """
     root = f"foreshock/{robot}"
-    ask = tuple(f"{root}/_/{q}" for q in QUESTIONS)
-    robot_writes = (f"{root}/*/*", f"{root}/_/alive/guard/**")
-    rules = [AccessRule(robot, robot_writes, ask)]
+    ask = tuple(f"{root}/@/{q}" for q in QUESTIONS)
+    guard = tuple(f"{root}/@/{what}" for what in ("lease_request", "ack", "alive/guard/**", "alive/twin/**"))
+    robot_writes = (f"{root}/*/*", *guard)
+    # what is asked of the supervisor it alone may answer; a twin answers what is asked of itself
+    answer = (f"{root}/@/twin/*",)
+    rules = [AccessRule(robot, robot_writes, ask, answer)]
     rules += [
-        AccessRule(name, (*(f"{root}/{c}" for c in channels), f"{root}/_/alive/twin/**"), ask)
+        AccessRule(name, (*(f"{root}/{c}" for c in channels), f"{root}/@/alive/twin/**"), ask, answer)
         for name, channels in twins.items()
     ]
-    rules.append(AccessRule(OPERATOR, (f"{root}/_/alive/operator/**",), (*ask, f"{root}/_/reset")))
+    rules.append(AccessRule(OPERATOR, (f"{root}/@/alive/operator/**",), (*ask, f"{root}/@/reset")))
     rules.append(AccessRule(VIEWER, (), ask))
     return tuple(rules)
 
@@ -78,7 +81,8 @@ def init_security(
             "listen": ["tls/127.0.0.1:7447"],
             "tls": {"ca": "ca.pem", "certificate": f"{SUPERVISOR}.pem", "key": f"{SUPERVISOR}.key.pem"},
             "access": [
-                {"name": r.name, "write": list(r.write), "ask": list(r.ask)} for r in access_rules(robot, twins)
+                {"name": r.name, "write": list(r.write), "ask": list(r.ask), "answer": list(r.answer)}
+                for r in access_rules(robot, twins)
             ],
         }
     }

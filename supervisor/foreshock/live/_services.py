@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -18,6 +19,8 @@ from foreshock.wire import Keys
 __all__ = ["ResetRequest", "Services"]
 
 RING = 16
+AT_ONCE = 4
+"""Questions of a kind that are answered in one tick; the others wait in their ring."""
 MOST_BYTES = 10_000
 
 
@@ -48,12 +51,14 @@ class Services:
             keys.alive("**", "").rstrip("/"), zenoh.handlers.RingChannel(256), history=True
         )
         self._alive: dict[str, None] = {}
+        self._lost: type[Exception] = zenoh.ZError
+        self._drop = zenoh.CongestionControl.DROP
         self._put = zenoh.SampleKind.PUT
 
     def peers(self) -> tuple[str, ...]:
         """Tokens that are up: ``<role>/<name>``."""
         while (token := self._tokens.try_recv()) is not None:
-            name = str(token.key_expr).partition("/_/alive/")[2]
+            name = str(token.key_expr).partition("/@/alive/")[2]
             if token.kind == self._put:
                 if len(self._alive) < 256:
                     self._alive[name] = None
@@ -71,9 +76,11 @@ class Services:
                 request = msgspec.json.decode(payload, type=ResetRequest)
                 record = supervisor.operator_reset(request.who, request.why, now_ns, request.dimension)
             except (BadInputError, msgspec.MsgspecError) as e:
-                query.reply_err(str(e).encode())
+                with suppress(self._lost):
+                    query.reply_err(str(e).encode())
             else:
-                query.reply(query.key_expr, msgspec.json.encode(record))
+                with suppress(self._lost):  # it is done and recorded, even where nobody waits for the answer
+                    query.reply(query.key_expr, msgspec.json.encode(record), congestion_control=self._drop)
                 yield record
             query.drop()
 
@@ -85,25 +92,26 @@ class Services:
         history: Iterable[tuple[int, bytes]],
     ) -> None:
         """Answer what was asked since the last tick."""
-        for query in _taken(self._asked["status"]):
-            _reply(query, msgspec.json.encode(status()))
-        for query in _taken(self._asked["taxonomy"]):
-            _reply(query, msgspec.json.encode(taxonomy))
-        for query in _taken(self._asked["config"]):
-            _reply(query, msgspec.json.encode(run.config))
-        for query in _taken(self._asked["history"]):
+        answers: dict[str, Callable[[], bytes]] = {
+            "status": lambda: msgspec.json.encode(status()),
+            "taxonomy": lambda: msgspec.json.encode(taxonomy),
+            "config": lambda: msgspec.json.encode(run.config),
             # length before each: a list of CDR payloads in one reply, so that they come in order or not at all
-            _reply(query, b"".join(len(data).to_bytes(4, "little") + data for _, data in history))
+            "history": lambda: b"".join(len(data).to_bytes(4, "little") + data for _, data in history),
+        }
+        for name, give in answers.items():
+            answer = None
+            for query in _taken(self._asked[name], AT_ONCE):
+                answer = give() if answer is None else answer
+                # a peer that asks and takes no answer must not keep the tick waiting
+                with suppress(self._lost):
+                    query.reply(query.key_expr, answer, congestion_control=self._drop)
+                query.drop()
 
 
-def _taken(queryable: Any) -> Iterator[Any]:
-    for _ in range(RING):
+def _taken(queryable: Any, most: int = RING) -> Iterator[Any]:
+    for _ in range(most):
         query = queryable.try_recv()
         if query is None:
             return
         yield query
-
-
-def _reply(query: Any, payload: bytes) -> None:
-    query.reply(query.key_expr, payload)
-    query.drop()

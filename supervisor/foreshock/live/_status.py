@@ -6,6 +6,7 @@ from collections import deque
 
 import msgspec
 
+from foreshock.live._denied import Denied, Refused
 from foreshock.live._stream import Stream, StreamCounts
 
 __all__ = ["Status", "StreamStatus", "TickTimes", "stream_status"]
@@ -48,6 +49,8 @@ class Status(msgspec.Struct, frozen=True):
         health: of detectors and channels that are not ok, with the reason.
         peers: liveliness tokens that are up.
         links: processes that are connected: address, and the name in the certificate where there is one.
+        denied: what peers tried and may not; empty without certificates.
+        refused: connections that did not come about for want of a valid certificate.
         journal: file that is written, or empty.
     """
 
@@ -74,6 +77,8 @@ class Status(msgspec.Struct, frozen=True):
     health: dict[str, str]
     peers: tuple[str, ...]
     links: tuple[str, ...]
+    denied: tuple[Denied, ...]
+    refused: tuple[Refused, ...]
     journal: str
 
 

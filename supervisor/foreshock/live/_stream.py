@@ -16,6 +16,9 @@ __all__ = ["Stream", "StreamCounts"]
 
 RING = 256
 """Of a stream that floods, the oldest samples are lost, and none of another stream."""
+MOST_GAPS = 1 << 53
+MOST_NS = 1 << 61
+"""Stamps beyond (73 years from either epoch) are no times, and sums of them would leave 64 bits."""
 SILENT_NS = 1_000_000_000
 """Another sender is believed when the first has been silent for so long."""
 
@@ -77,29 +80,22 @@ class Stream:
         self._sequence = -1
         self._stamp_ns = -1
 
-    def drain(self, now_ns: int) -> list[Sample]:
-        """Samples that arrived since the last call; now_ns is the time of the tick."""
-        waiting = []
-        for _ in range(RING):
-            raw = self._subscriber.try_recv()
-            if raw is None:
-                break
-            waiting.append(raw)
-        if not waiting:
-            return []
-        # after the last was taken, so that none of them can have come later: decoding may take its time
+    def take(self, now_ns: int) -> tuple[Sample | None, int] | None:
+        """The oldest that waits and its length in bytes; no sample if it is none that counts, None if nothing waits.
+
+        Args:
+            now_ns: time of the tick.
+        """
+        raw = self._subscriber.try_recv()
+        if raw is None:
+            return None
         arrival_ns = monotonic_ns()
-        found: list[Sample] = []
-        for raw in waiting:
-            try:
-                sample = self._read(raw, now_ns, arrival_ns)
-            except WireError as e:
-                self.counts.garbage += 1
-                self.counts.last_fault = str(e)
-                continue
-            if sample is not None:
-                found.append(sample)
-        return found
+        try:
+            return self._read(raw, now_ns, arrival_ns), min(len(raw.payload), MAX_BYTES)
+        except WireError as e:
+            self.counts.garbage += 1
+            self.counts.last_fault = str(e)
+            return None, 0
 
     def _read(self, raw: Any, now_ns: int, arrival_ns: int) -> Sample | None:
         counts = self.counts
@@ -114,12 +110,14 @@ class Stream:
             raise WireError(self.channel, f"{len(raw.payload)} bytes, at most {MAX_BYTES} are read")
         message, header_ns = self._codec.decode(self._cls, raw.payload.to_bytes())
         stamp_ns = attachment.stamp_ns if header_ns is None else header_ns
+        if not -MOST_NS < stamp_ns < MOST_NS:
+            raise WireError(self.channel, f"a stamp of {stamp_ns} ns is no time")
         sequence = attachment.sequence
         if sequence == self._sequence and stamp_ns == self._stamp_ns:
             counts.repeated += 1
             return None
         if self._sequence >= 0 and sequence > self._sequence + 1:
-            counts.gaps += sequence - self._sequence - 1
+            counts.gaps = min(counts.gaps + sequence - self._sequence - 1, MOST_GAPS)
         if stamp_ns < self._stamp_ns:
             counts.backwards += 1
             counts.last_fault = f"a stamp {(self._stamp_ns - stamp_ns) / 1e6:.1f} ms before the one before it"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -16,6 +16,9 @@ from foreshock.records import Sample
 from foreshock.wire import BY_ROS, Codec
 
 __all__ = ["JournalFile", "Tick", "is_journal", "records_of"]
+
+
+T = TypeVar("T")
 
 
 class Tick(msgspec.Struct, frozen=True):
@@ -122,6 +125,7 @@ class JournalFile:
         data = hashlib.sha256(b"foreshock samples 1")
         waiting: list[tuple[str, bytes]] = []
         resets: list[OperatorReset] = []
+        tick = -1
         for record in records_of(self.path):
             if isinstance(record, Schema):
                 schemas[record.id] = record.name
@@ -130,14 +134,22 @@ class JournalFile:
             elif isinstance(record, DataEnd):
                 self.complete = True
             elif isinstance(record, Message):
-                topic, schema = channels[record.channel_id]
+                topic, schema = channels.get(record.channel_id, ("", ""))
                 if topic == TICK:
-                    yield self._tick(msgspec.json.decode(record.data, type=TickRecord), waiting, resets, data, codec)
+                    noted = self._json(record.data, TickRecord, tick)
+                    tick = noted.tick
+                    yield self._tick(noted, waiting, resets, data, codec)
                     waiting, resets = [], []
                 elif topic == RESET:
-                    resets.append(msgspec.json.decode(record.data, type=OperatorReset))
+                    resets.append(self._json(record.data, OperatorReset, tick))
                 elif topic != DECISION:
                     waiting.append((schema, record.data))
+
+    def _json(self, data: bytes, cls: type[T], tick: int) -> T:
+        try:
+            return msgspec.json.decode(data, type=cls)
+        except msgspec.MsgspecError as e:
+            raise BadInputError(str(self.path), f"a {cls.__name__} after tick {tick} cannot be read: {e}") from None
 
     def _tick(
         self,

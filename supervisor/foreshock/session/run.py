@@ -59,7 +59,7 @@ class Run(msgspec.Struct, frozen=True):
         first_s: first time of each precursor kind of the mode, in s.
         gate_s: first time at the caution and protective level of the mode.
         interventions: all changes.
-        ignored: actions that were decided but that the twin does not understand.
+        ignored: actions that were decided or scripted but that the twin does not understand.
         health: all changes of detectors and channels.
         timeline: ticks at which something changed.
         series: columns over time, for plots; ``t_s`` is the first.
@@ -67,6 +67,8 @@ class Run(msgspec.Struct, frozen=True):
         max_level: highest protection level of the mode, or minimal risk.
         warnings: what of the configuration leaves the scenario's mode unwatched or unprotected.
         peak_p: highest P of the mode before its accident; None if nobody judged.
+        safe_s: since when the mode's control-level trust has been at its caution gate or above until the end, 0 if
+            always; None if it was not at the end, the accident happened, or nobody judged.
     """
 
     scenario: str
@@ -90,6 +92,7 @@ class Run(msgspec.Struct, frozen=True):
     max_level: int = 0
     warnings: tuple[str, ...] = ()
     peak_p: float | None = None
+    safe_s: float | None = None
 
     @property
     def harmed(self) -> bool:

@@ -18,7 +18,20 @@ from foreshock.registry import Broken, Registry
 from foreshock.session.faults import Fault
 from foreshock.taxonomy import builtin_taxonomy
 
-__all__ = ["Distribution", "Scenario", "Severity", "broken_scenarios", "find_scenario", "load_scenario", "scenario_ids"]
+__all__ = [
+    "VARIANT",
+    "Distribution",
+    "Scenario",
+    "Severity",
+    "broken_scenarios",
+    "find_scenario",
+    "load_scenario",
+    "scenario_ids",
+]
+
+
+VARIANT = "@"
+"""Between the id of a scenario and the kind of twin that a variant of it runs on."""
 
 
 class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -71,7 +84,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One declared situation.
 
     Attributes:
-        id: e.g. ``a1-fall-onto-human``.
+        id: e.g. ``a1-fall-onto-human``; ``a1-fall-onto-human@mujoco`` is its variant on a twin of kind ``mujoco``.
         title: one line for people.
         mode: code of the accident mode that it is about.
         expect: what happens when unsupervised: ``accident``, ``none`` or ``open``.
@@ -81,8 +94,12 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         parameters: values of the twin's parameters, where they differ from its defaults; finite.
         distributions: parameters that each seed draws anew.
         severity: the parameter to sweep, and its values; None if none was chosen.
+        accidents: ids of the plant's events that count as its accident, beside those that the plant gives to the mode.
         folder: where the file lies; relative paths start there.
         faults: of sensors, messages, actuators and detectors.
+        safe: what must hold, as a formula of signal temporal logic over the twin's probes, whose robustness leads
+            falsification; what an accident is, the referee says.
+        seed: of a simulation that names none.
     """
 
     id: str
@@ -95,11 +112,15 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parameters: dict[str, float] = {}
     distributions: dict[str, Distribution] = {}
     severity: Severity | None = None
+    accidents: tuple[str, ...] = ()
     folder: str = ""
     faults: tuple[Fault, ...] = ()
+    safe: str = ""
+    seed: int = 0
 
     def __post_init__(self) -> None:
         within(f"{self.id}: duration_s", self.duration_s, 0.0, above=True)
+        within(f"{self.id}: seed", self.seed, 0)
         codes = builtin_taxonomy().codes
         if self.mode not in codes:
             hint = nearest(self.mode, codes)
@@ -109,8 +130,11 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ConfigError(f"{self.id}: parameters.{name}", f"{value!r} is not a finite number")
         if both := sorted(self.parameters.keys() & self.distributions.keys()):
             raise ConfigError(f"{self.id}: distributions.{both[0]}", "has a fixed value under parameters as well")
-        if not isinstance(self.twin.get("kind"), str):
+        kind = self.twin.get("kind")
+        if not isinstance(kind, str):
             raise ConfigError(f"{self.id}: twin.kind", "missing; it names a kind of twin, e.g. 'fmu'")
+        if VARIANT in self.id and self.id.partition(VARIANT)[2] != kind:
+            raise ConfigError("id", f"{self.id!r} names another twin than twin.kind = {kind!r}")
 
     def supervisor(self) -> Config:
         """The supervisor's configuration, checked."""
@@ -154,9 +178,9 @@ def load_scenario(path: Path) -> Scenario:
     return convert(data, Scenario, str(path))
 
 
-def scenario_ids(registry: Registry) -> dict[str, Scenario]:
-    """All scenarios of the installed plugins that can be read, by id."""
-    return _sifted(registry)[0]
+def scenario_ids(registry: Registry, *, variants: bool = False) -> dict[str, Scenario]:
+    """All scenarios of the installed plugins that can be read, by id; variants on other twins only if asked for."""
+    return {id_: s for id_, s in _sifted(registry)[0].items() if variants or VARIANT not in id_}
 
 
 def broken_scenarios(registry: Registry) -> tuple[Broken, ...]:
@@ -164,8 +188,8 @@ def broken_scenarios(registry: Registry) -> tuple[Broken, ...]:
     return _sifted(registry)[1]
 
 
-def find_scenario(name: str, registry: Registry) -> Scenario:
-    """The scenario with this id, or in this TOML file.
+def find_scenario(name: str, registry: Registry, twin: str = "") -> Scenario:
+    """The scenario with this id, or in this TOML file; its variant on this kind of twin, if there is one.
 
     Raises:
         ConfigError: there is none; the nearest ids are named, and all that could not be read: it may be among them.
@@ -173,6 +197,8 @@ def find_scenario(name: str, registry: Registry) -> Scenario:
     if name.endswith(".toml"):
         return load_scenario(Path(name))
     known, broken = _sifted(registry)
+    if twin and f"{name}{VARIANT}{twin}" in known:
+        return known[f"{name}{VARIANT}{twin}"]
     if name not in known:
         left_out = "".join(f"\nplugin {b.name} is left out: {b.reason}" for b in (*registry.load_all(), *broken))
         raise ConfigError("scenario", f"no scenario {name!r}", nearest(name, known) + left_out)

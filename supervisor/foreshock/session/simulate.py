@@ -6,6 +6,8 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 
+from msgspec.structs import replace
+
 from foreshock.clock import NS_PER_S, ns, seconds
 from foreshock.errors import ConfigError
 from foreshock.journal import DigestJournal, Journal
@@ -76,7 +78,8 @@ def simulate(
     digest = DigestJournal()
     recorders = (digest, *journals) if detail else tuple(journals)
     tied = judge.taxonomy.kinds_of(scenario.mode) if judge is not None else frozenset()
-    log = _Log(scenario.mode, tied, detail)
+    caution = judge.config.gates.of_modes(judge.taxonomy)[scenario.mode].caution if judge is not None else 1.0
+    log = _Log(scenario.mode, tied, caution, detail)
     now, end, stop = 0, ns(scenario.duration_s), None
     told = 0
     ignored: set[str] = set()
@@ -86,8 +89,10 @@ def simulate(
             change = waiting.popleft()
             if change.action in twin.actions:
                 twin.intervene(change)
+            else:
+                ignored.add(change.action)
         samples = twin.advance(now)
-        events = twin.events()
+        events = _events(scenario, twin)
         decision = None
         if judge is not None:
             decision = judge.step(samples, now, crashes.at(now))
@@ -105,7 +110,7 @@ def simulate(
         if progress is not None and now - told >= NS_PER_S // 4:
             told = now
             progress(seconds(now))
-    events = tuple(twin.events())
+    events = _events(scenario, twin)
     accidents = [e for e in events if e.mode == scenario.mode]
     outcome = accidents[0].id if accidents else events[0].id if events else "none"
     policies = "+".join(p.use for p in judge.config.policies) if judge is not None else ""
@@ -131,6 +136,7 @@ def simulate(
         log.max_level,
         warnings_of(judge, scenario.mode) if judge is not None else (),
         log.peak_p,
+        None if accidents else log.safe_s,
     )
 
 
@@ -153,11 +159,19 @@ def warnings_of(supervisor: Supervisor, mode: str | None = None) -> tuple[str, .
     return tuple(found)
 
 
+def _events(scenario: Scenario, twin: Twin) -> tuple[TwinEvent, ...]:
+    """What the referee saw; what the scenario counts as its accident belongs to its mode."""
+    events = tuple(twin.events())
+    if not scenario.accidents:
+        return events
+    return tuple(replace(e, mode=scenario.mode) if e.id in scenario.accidents and not e.mode else e for e in events)
+
+
 class _Log:
     """Collects what a Run keeps."""
 
-    def __init__(self, mode: str, tied: frozenset[str], detail: bool) -> None:
-        self._mode, self._tied, self._detail = mode, tied, detail
+    def __init__(self, mode: str, tied: frozenset[str], caution: float, detail: bool) -> None:
+        self._mode, self._tied, self._caution, self._detail = mode, tied, caution, detail
         self._before: tuple[object, ...] = ()
         self._known: frozenset[str] = frozenset()
         self._events = 0
@@ -169,6 +183,8 @@ class _Log:
         self.series: dict[str, list[float]] = {}
         self.max_level = 0
         self.peak_p: float | None = None
+        self.safe_s: float | None = None
+        self._began = False
         self._over = False
 
     def tick(self, now_ns: int, decision: Decision | None, events: Sequence[TwinEvent], twin: Twin) -> None:
@@ -191,6 +207,11 @@ class _Log:
         self.health += d.health
         if not self._over:
             self.peak_p = max(self.peak_p or 0.0, d.risk.by_mode[mode])
+        if not (d.trust.control_by_mode[mode] >= self._caution):
+            self.safe_s = None
+        elif self.safe_s is None:
+            self.safe_s = t if self._began else 0.0
+        self._began = True
         level = d.level if d.level is ProtectionLevel.MINIMAL_RISK else d.levels[mode]
         self.max_level = max(self.max_level, level)
         for gate in (ProtectionLevel.CAUTION, ProtectionLevel.PROTECTIVE):

@@ -28,13 +28,14 @@ from foreshock.records import Decision, Sample
 from foreshock.supervisor import build_detector, kinds_of
 from foreshock.taxonomy import PrecursorKind, builtin_taxonomy
 from foreshock.testing._purity import Purity
-from foreshock.testing.faults import disordered, duplicated, silenced, spoiled
+from foreshock.testing.faults import disordered, duplicated, frozen, silenced, spoiled
 from foreshock.testing.rig import Call, Play, Rig, arrival_ns
 from foreshock.testing.spec_checks import spec_checks
 
 __all__ = ["DetectorConformance"]
 
 LONGEST_S = 120.0
+LOSSES = {"silent": silenced, "not-a-number": spoiled, "frozen": frozen}
 
 
 class DetectorConformance:
@@ -66,10 +67,9 @@ class DetectorConformance:
     def pytest_generate_tests(self, metafunc: Any) -> None:
         """One test per input and per way of losing it."""
         if "lost_input" in metafunc.fixturenames:
-            names = [i.name for i in self._rig.inputs.values() if i.channel != "*"]
-            metafunc.parametrize("lost_input", names)
-        if "loss" in metafunc.fixturenames:
-            metafunc.parametrize("loss", ["silent", "not-a-number"])
+            named = [i for i in self._rig.inputs.values() if i.channel != "*"]
+            cases = [(i.name, loss) for i in named for loss in LOSSES if loss != "frozen" or i.max_standstill_s]
+            metafunc.parametrize(("lost_input", "loss"), cases)
 
     def test_declares_itself(self) -> None:
         """Id, kinds, inputs, settings and build are as the port demands."""
@@ -160,12 +160,14 @@ class DetectorConformance:
 
         The loss begins while something is present. A required input leaves all kinds unobserved once it is stale (at
         once if it is malformed), and P does not fall from then on. Without an optional one kinds may be left out, or
-        judged from the rest; but what was present at the loss, and with that input still would be, is not cleared.
+        judged from the rest; but what was present at the loss, and with that input still would be, is not cleared. Of
+        values that stand still all this holds from the end of the declared standstill on.
         """
         rig, need = self._rig, self._rig.inputs[lost_input]
         at_ns = self._worst_ns
         channel = rig.channel(lost_input)
-        samples = (silenced if loss == "silent" else spoiled)(self._samples, channel, at_ns)
+        samples = LOSSES[loss](self._samples, channel, at_ns)
+        noticed_ns = self._frozen_ns(need, at_ns) if loss == "frozen" else at_ns
         play = rig.play(samples, until_ns=arrival_ns(self._samples[-1]))
         problem = self._first_problem(play, unobserved_is_fine=True)
         assert not problem, f"without {lost_input} ({loss}): {problem}"
@@ -175,14 +177,26 @@ class DetectorConformance:
             if d.now_ns <= at_ns:
                 continue
             held -= {key for key, present in full.get(d.now_ns, {}).items() if not present}
+            if d.now_ns < noticed_ns:
+                continue
             wrong = sorted(held & {(i.kind, i.subject) for i in d.indications if not i.present})
             assert not wrong, f"without {lost_input} ({loss}) it clears {wrong} at {d.now_ns} ns, present with it"
         if need.required:
-            self._assert_unobserved(play.decisions, need, at_ns, loss)
+            self._assert_unobserved(play.decisions, need, noticed_ns, loss)
+
+    def _frozen_ns(self, need: Input, at_ns: int) -> int:
+        """Arrival of the first sample by which an input that is frozen from at_ns on has stood still too long."""
+        mine = [s for s in self._samples if s.channel == f"{self.robot}/{need.channel}"]
+        moved_ns = max((s.stamp_ns for s in mine if arrival_ns(s) <= at_ns), default=at_ns)
+        later = [arrival_ns(s) for s in mine if s.stamp_ns > moved_ns + ns(need.max_standstill_s)]
+        assert later, f"recording(): ends less than {need.max_standstill_s:g} s after something is present"
+        return later[0]
 
     def _assert_unobserved(self, decisions: Sequence[Decision], need: Input, at_ns: int, loss: str) -> None:
         last = [s for s in self._samples if s.channel == f"{self.robot}/{need.channel}" and arrival_ns(s) <= at_ns]
         from_ns = (last[-1].stamp_ns + ns(need.max_age_s)) if loss == "silent" and last else at_ns + ns(need.max_age_s)
+        if loss == "frozen":
+            from_ns = at_ns - 1
         after = [d for d in decisions if d.now_ns > from_ns]
         assert after, f"recording(): ends less than {need.max_age_s:g} s after something is present"
         held = 0.0

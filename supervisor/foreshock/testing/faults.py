@@ -1,4 +1,4 @@
-"""What sensors and transports do to a recording: silence, numbers that are none, duplicates, disorder."""
+"""What sensors and transports do to a recording: silence, NaN, values that stand still, duplicates, disorder."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from foreshock.records import Sample
 from foreshock.session.fields import not_a_number
 from foreshock.testing.rig import arrival_ns
 
-__all__ = ["disordered", "duplicated", "not_a_number", "silenced", "spoiled"]
+__all__ = ["disordered", "duplicated", "frozen", "not_a_number", "silenced", "spoiled"]
 
 
 def silenced(samples: Sequence[Sample], channel: str, from_ns: int) -> tuple[Sample, ...]:
@@ -32,6 +32,17 @@ def spoiled(samples: Sequence[Sample], channel: str, from_ns: int) -> tuple[Samp
             s = msgspec.structs.replace(s, value=value)
         out.append(s)
     return tuple(out)
+
+
+def frozen(samples: Sequence[Sample], channel: str, from_ns: int) -> tuple[Sample, ...]:
+    """The samples with the last value that arrived on a channel by from_ns in every later one; stamps go on."""
+    before = [s for s in samples if s.channel == channel and arrival_ns(s) <= from_ns]
+    return tuple(
+        msgspec.structs.replace(s, value=before[-1].value)
+        if before and s.channel == channel and arrival_ns(s) > from_ns
+        else s
+        for s in samples
+    )
 
 
 def duplicated(samples: Sequence[Sample]) -> tuple[Sample, ...]:

@@ -163,6 +163,10 @@ def _input(i: Input) -> str:
         return f"type {name} is not a message that a sample can carry{nearest(name, known)}"
     if not (math.isfinite(i.max_age_s) and i.max_age_s > 0.0):
         return f"max_age_s is {i.max_age_s}, a positive time is expected"
+    if not (math.isfinite(i.max_standstill_s) and i.max_standstill_s >= 0.0):
+        return f"max_standstill_s is {i.max_standstill_s}, zero or a positive time is expected"
+    if i.channel == "*" and i.max_standstill_s:
+        return f"max_standstill_s is {i.max_standstill_s}, but a reader of every channel cannot tell which stands still"
     if not (math.isfinite(i.min_rate_hz) and i.min_rate_hz >= 0.0):
         return f"min_rate_hz is {i.min_rate_hz}, zero or a positive rate is expected"
     return ""

@@ -12,7 +12,7 @@ from foreshock.wire._types import typestore
 
 __all__ = ["MAX_BYTES", "Codec", "decode_reference", "decode_ros", "encode_reference", "encode_ros"]
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = 250_000
 """A payload longer than this is refused unread: no message of ours comes near it."""
 MOST_LAYOUTS = 64
 """A peer that changes its joint names with every message must not fill the memory."""
@@ -74,7 +74,7 @@ class Codec:
         if cls not in HOT:
             return decode_reference(cls, data)
         key = (cls, len(data))
-        known = self._in.setdefault(key, [])
+        known = self._in.get(key, [])
         for layout in known:
             found = layout.decode(data)
             if found is not None:
@@ -83,9 +83,9 @@ class Codec:
         if len(known) < MOST_PER_LENGTH:
             layout_ = learn(message, encode_reference, data)
             if layout_ is not None:
-                if len(self._in) > MOST_LAYOUTS:
-                    self._in = {key: known}
-                known.append(layout_)
+                if key not in self._in and len(self._in) >= MOST_LAYOUTS:
+                    self._in.clear()
+                self._in[key] = [*known, layout_]
         return message, stamp_ns
 
 

@@ -19,6 +19,8 @@ __all__ = ["HOT", "Layout", "learn"]
 
 Numbers = tuple[float, ...]
 STAMP = struct.Struct("<iI")
+MOST_NUMBERS = 400
+"""Learning takes time with their square: a message of 6,000 joints would stop the supervisor for 11 s."""
 STAMP_AT = 4
 """The header's stamp comes first, after the four bytes that say CDR, little-endian."""
 
@@ -123,6 +125,8 @@ def learn(message: AnyMessage, reference: Callable[[AnyMessage, int], bytes], li
     """
     shape = HOT[type(message)]
     constant, n = shape.constant(message), len(shape.numbers(message))
+    if n > MOST_NUMBERS:
+        return None
     # exponents far from anything physical, so that no constant bytes equal a marker
     markers = tuple(struct.unpack("<d", struct.pack("<Q", 0x7A5A_0000_0000_0000 + 7919 * (k + 1)))[0] for k in range(n))
     template = reference(shape.make(constant, markers), 0)

@@ -1,7 +1,8 @@
 """Key expressions: our own scheme, and rmw_zenoh's for ROS 2 robots that need no bridge.
 
-Own scheme: ``foreshock/<channel>`` for streams, ``foreshock/<robot>/_/<service>`` for what supervisor, guards and
-operators exchange (no channel has the subject ``_``). rmw_zenoh's: ``<domain>/<topic>/<type>/<hash>``.
+Own scheme: ``foreshock/<channel>`` for streams, ``foreshock/<robot>/@/<service>`` for what supervisor, guards and
+operators exchange: a chunk that begins with ``@`` is met by no wildcard, so that nobody who may write
+``<robot>/*/*`` reaches a service. rmw_zenoh's: ``<domain>/<topic>/<type>/<hash>``.
 """
 
 from __future__ import annotations
@@ -52,11 +53,11 @@ class Keys(msgspec.Struct, frozen=True):
 
     def service(self, name: str) -> str:
         """Of what is exchanged beside the streams, e.g. ``lease``, ``intervention``, ``status``."""
-        return f"{ROOT}/{self.robot}/_/{name}"
+        return f"{ROOT}/{self.robot}/@/{name}"
 
     def alive(self, role: str, name: str) -> str:
         """Liveliness token of a supervisor, guard, twin or operator."""
-        return f"{ROOT}/{self.robot}/_/alive/{role}/{name}"
+        return f"{ROOT}/{self.robot}/@/alive/{role}/{name}"
 
 
 def liveliness_token(

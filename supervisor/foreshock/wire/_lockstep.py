@@ -1,6 +1,6 @@
 """Stepping a twin by query: JSON that any simulator can speak, samples in it as base64 of CDR (docs/twins.md).
 
-Key ``foreshock/<robot>/_/twin``. Each request names an operation; the reply is a JSON object, or a reply error with a
+Key ``foreshock/<robot>/@/twin``. Each request names an operation; the reply is a JSON object, or a reply error with a
 text. ``advance`` to the time that was reached already gives the same answer again, so that a request whose answer was
 lost may be repeated.
 """

@@ -33,18 +33,25 @@ FMU plants under their ids: ``fall-onto-human`` A1, ``arm-strike`` A2, ``leg-swi
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
 
-from foreshock.errors import ConfigError, MissingExtraError
+from foreshock.errors import MissingExtraError
 from foreshock.hookspecs import hookimpl
-from foreshock.twin import Twin, TwinSpec
+from foreshock.twin import Take, Twin, TwinSpec
 from foreshock_twins.mujoco._robot import RobotConfig, robot_files
 
-__all__ = ["MujocoTwinConfig", "RobotConfig", "build_twin", "foreshock_twins", "twin_files"]
+__all__ = [
+    "MujocoTwinConfig",
+    "RobotConfig",
+    "build_twin",
+    "foreshock_scenarios",
+    "foreshock_twins",
+    "pictures",
+    "twin_files",
+]
 
 
 class MujocoTwinConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,15 +59,9 @@ class MujocoTwinConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         robot: the humanoid; TALOS if not given.
-        record_hz: rate at which poses are kept for pictures; 0 keeps none.
     """
 
     robot: RobotConfig = RobotConfig()
-    record_hz: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.record_hz) and self.record_hz >= 0.0):
-            raise ConfigError("twin.record_hz", f"{self.record_hz!r} is not a rate", "; expected 0 or more, in Hz")
 
 
 def build_twin(config: MujocoTwinConfig, robot: str, scratch: Path) -> Twin:  # noqa: ARG001  # nothing is temporary
@@ -81,7 +82,7 @@ def build_twin(config: MujocoTwinConfig, robot: str, scratch: Path) -> Twin:  # 
     from foreshock_twins.mujoco._twin import MujocoTwin
 
     body = Body(config.robot, furnish)
-    return MujocoTwin(robot, body, People(body.model), config.record_hz)
+    return MujocoTwin(robot, body, People(body.model))
 
 
 def twin_files(config: MujocoTwinConfig) -> Mapping[str, Path]:
@@ -90,8 +91,34 @@ def twin_files(config: MujocoTwinConfig) -> Mapping[str, Path]:
     return {"model": model} if srdf is None else {"model": model, "srdf": srdf}
 
 
+def pictures(config: MujocoTwinConfig, takes: Sequence[Take], times_s: Sequence[float], files: Sequence[Path]) -> None:
+    """Draw runs side by side: films (``.mp4``, ``.gif``) and stills (``.png``).
+
+    Raises:
+        ConfigError: the robot's files or the names in them are wrong.
+        MissingExtraError: MuJoCo, av or Pillow is not installed.
+        NoOpenGLError: nothing can be drawn on this machine.
+    """
+    try:
+        import av  # noqa: F401  # said before anything is drawn
+        import mujoco  # noqa: F401
+        import PIL  # noqa: F401
+    except ImportError as error:
+        problem = f"needs {error.name}, which cannot be imported: {error}"
+        raise MissingExtraError("pictures", problem, "; run: pip install 'foreshock[mujoco]'") from error
+    from foreshock_twins.mujoco._pictures import draw
+
+    draw(config.robot, takes, times_s, files)
+
+
 @hookimpl
 def foreshock_twins() -> Sequence[TwinSpec]:
     """The twin kind ``mujoco``."""
     summary = "A whole-body humanoid in MuJoCo, TALOS by default"
-    return [TwinSpec("mujoco", build_twin, MujocoTwinConfig, summary, twin_files)]
+    return [TwinSpec("mujoco", build_twin, MujocoTwinConfig, summary, twin_files, pictures)]
+
+
+@hookimpl
+def foreshock_scenarios() -> Sequence[Path]:
+    """The scenarios of this twin: those of the FMU plants under their ids with ``@mujoco``, and falls by cause."""
+    return sorted((Path(__file__).parent / "scenarios").glob("*.toml"))

@@ -2,8 +2,8 @@
 
 Sizes are those of the template that the FMU plants use too (foreshock_twins.fmi._adult, after Drillis and Contini,
 1966, and ANSUR II), jointed, and with feet of 0.152 statures (Winter, fig. 4.1). The human is kinematic: he pushes and
-is never pushed, and to MuJoCo's contact solver a mocap body is a wall at rest that is elsewhere at each step. A contact
-force is hence that of a rigid standing person, an upper bound.
+is never pushed. To MuJoCo's own contact solver a mocap body is a rigid wall at rest that is elsewhere at each step; the
+twin lets it compute no force and takes the body model of foreshock_twins.mujoco._contact instead.
 """
 
 from __future__ import annotations

@@ -60,9 +60,10 @@ class Body:
     Args:
         robot: which robot.
         furnish: adds what else stands in the world, before the model is compiled.
+        visual: keep meshes that are for show alone.
     """
 
-    def __init__(self, robot: RobotConfig, furnish: Any = None) -> None:
+    def __init__(self, robot: RobotConfig, furnish: Any = None, visual: bool = False) -> None:
         self.robot = robot
         path, srdf = robot_files(robot)
         self.pin_model, self.q0 = _pinocchio(robot, path, srdf)
@@ -76,7 +77,7 @@ class Body:
         com = pin.centerOfMass(pm, data, self.q0)
         self.mass_kg, self.com_height_m = float(pin.computeTotalMass(pm)), float(com[2])
         self._find_parts(robot)
-        spec = self._spec(path, robot)
+        spec = self._spec(path, robot, visual)
         if furnish is not None:
             furnish(spec)
         try:
@@ -189,8 +190,8 @@ class Body:
         self.armature = _ARMATURE * scale
         self.joint_damping = _JOINT_DAMPING * scale
 
-    def _spec(self, path: Path, robot: RobotConfig) -> Any:
-        spec = _mujoco_spec(path, robot)
+    def _spec(self, path: Path, robot: RobotConfig, visual: bool) -> Any:
+        spec = _mujoco_spec(path, robot, visual)
         base = spec.body(robot.base) if robot.base else spec.worldbody.first_body()
         if base is None:
             known = [b.name for b in spec.bodies if b.name != "world"]
@@ -379,7 +380,7 @@ def _pinocchio(robot: RobotConfig, path: Path, srdf: Path | None) -> tuple[Any, 
     return pm, q
 
 
-def _mujoco_spec(path: Path, robot: RobotConfig) -> Any:
+def _mujoco_spec(path: Path, robot: RobotConfig, visual: bool) -> Any:
     """MjSpec of the model file. In a URDF, package:// becomes a path, and MuJoCo is told how to read it."""
     try:
         if path.suffix == ".xml":
@@ -394,7 +395,8 @@ def _mujoco_spec(path: Path, robot: RobotConfig) -> Any:
             return str(found)
 
         text = re.sub(r"package://([^\"']+)", located, text)
-        flags = 'strippath="false" discardvisual="true" fusestatic="true" balanceinertia="true"'
+        discard = "false" if visual else "true"
+        flags = f'strippath="false" discardvisual="{discard}" fusestatic="true" balanceinertia="true"'
         head = f"<mujoco><compiler {flags}/></mujoco>"
         text = re.sub(r"(<robot\b[^>]*>)", lambda m: m[1] + head, text, count=1)
         return mujoco.MjSpec.from_string(text)

@@ -6,9 +6,9 @@ import copy
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-import msgspec
 import mujoco
 import numpy as np
 
@@ -22,10 +22,11 @@ from foreshock_twins.mujoco._disturb import Disturbances
 from foreshock_twins.mujoco._model import STEP_S, Body
 from foreshock_twins.mujoco._parameters import values_of
 from foreshock_twins.mujoco._people import People
+from foreshock_twins.mujoco._poses import Poses
 from foreshock_twins.mujoco._referee import Referee
 from foreshock_twins.mujoco._sensors import Measured, Sensors
 
-__all__ = ["Frame", "MujocoTwin"]
+__all__ = ["MujocoTwin"]
 
 _SUBSTEPS = round(PERIOD_NS / NS_PER_S / STEP_S)
 _KEPT = 256
@@ -36,30 +37,19 @@ _NEAR_M, _FALL_M = 1.0, 2.0
 """A human farther than this from the base, beyond arms (and a fall), is not looked for at each step."""
 
 
-class Frame(msgspec.Struct, frozen=True):
-    """What a renderer needs of one instant: MuJoCo's qpos, mocap_pos and mocap_quat, to be copied into a MjData."""
-
-    time_ns: int
-    qpos: Any
-    mocap_pos: Any
-    mocap_quat: Any
-
-
 class MujocoTwin:
     """A stepped twin. Call reset first.
 
     Attributes:
-        model: MuJoCo's model of this run; for a renderer, together with frames.
-        frames: recorded since reset, if record_hz is above 0.
+        model: MuJoCo's model of this run.
 
     Args:
         robot: prefix of the channels.
         body: the robot and the things in its world.
         people: the human.
-        record_hz: rate of frames.
     """
 
-    def __init__(self, robot: str, body: Body, people: People, record_hz: float = 0.0) -> None:
+    def __init__(self, robot: str, body: Body, people: People) -> None:
         self._robot, self._body, self._people = robot, body, people
         self._control = Controller(body, PERIOD_NS)
         self._sensors = Sensors(body)
@@ -67,9 +57,9 @@ class MujocoTwin:
         self._out = Channels(body, self._control)
         legs = frozenset(int(body.model.jnt_bodyid[body.model.joint(body.joints[k]).id]) for k in body.legs)
         self._referee = Referee(body.com_height_m, legs)
-        self._every = max(1, round(NS_PER_S / record_hz / PERIOD_NS)) if record_hz > 0.0 else 0
+        self._poses = Poses()
         self._floor_geoms = frozenset(body.model.geom(n).id for n in ("floor", "block"))
-        self.model, self.frames = body.model, list[Frame]()
+        self.model = body.model
         self._ready = False
 
     @property
@@ -114,7 +104,7 @@ class MujocoTwin:
         self._shown = 0
         self._pressure = (0.0, 0.0)
         self._sequence: dict[str, int] = {}
-        self.frames = []
+        self._poses.begin()
         self._disturbances.apply(-1, 0.0, (0.0, 0.0, 0.0))
         mujoco.mj_forward(self.model, self._data)
         self._measure()
@@ -174,6 +164,14 @@ class MujocoTwin:
         found |= {"contact_force": referee.force, "contact_force_peak": referee.peak, "floor_peak": referee.floor_peak}
         found |= {"balance_lost": referee.lost, "fallen": referee.fallen, "steps": self._control.gait.steps}
         return {name: float(value) for name, value in found.items()}
+
+    def record(self, rate_hz: float) -> None:
+        """Keep poses at this rate from the next reset on; 0 keeps none."""
+        self._poses = Poses(rate_hz)
+
+    def save(self, path: Path) -> None:
+        """Write the poses since the reset into a file for the pictures of this kind of twin."""
+        self._poses.save(path)
 
     def close(self) -> None:
         """Nothing is held that the garbage collector does not free."""
@@ -247,10 +245,7 @@ class MujocoTwin:
 
     def _measure(self) -> None:
         self._kept.append(self._sensors.measure(self._data, self._tick * PERIOD_NS))
-        if self._every and self._tick % self._every == 0:
-            data = self._data
-            pose = data.qpos.copy(), data.mocap_pos.copy(), data.mocap_quat.copy()
-            self.frames.append(Frame(self._tick * PERIOD_NS, *pose))
+        self._poses.take(self._tick * PERIOD_NS, self._data)
 
     def _aged(self, now_ns: int, age_s: float) -> Measured:
         """The newest measurement that is at least so old, or the first."""
