@@ -142,10 +142,10 @@ def test_a_leg_that_walks_into_a_human_is_an_accident_of_mode_a3(twin: MujocoTwi
     assert not twin.events()
 
 
-def test_an_arm_that_is_thrown_against_a_human_is_an_accident_of_mode_a2(twin: MujocoTwin) -> None:
-    bump = {"stepping": 0.0, "arms_forward": 1.0, "push_impulse": 28.0, "push_time": 1.0, "human": 1.0, "human_y": -0.2}
-    twin.reset({**bump, "human_x": 0.85}, 1)
-    twin.advance(2_700_000_000)
+def test_an_arm_stretched_into_the_way_of_a_human_is_an_accident_of_mode_a2(twin: MujocoTwin) -> None:
+    passing = {"stepping": 0.0, "human": 2.0, "human_x": 2.5, "human_y": 0.75, "human_speed": 2.0}
+    assert not run(twin, 2.5, **passing).events
+    run(twin, 2.5, ((0.3, "arm-reconfiguration", 1.0),), **passing)
     struck = {e.id: e for e in twin.events()}
     assert struck["arm-strike"].mode == "A2"
     assert struck["arm-strike"].value > 1.0 == struck["arm-strike"].limit

@@ -106,16 +106,14 @@ def test_a_stop_in_double_support_stands_and_its_release_walks_on(twin: MujocoTw
     assert seen.truth[-1]["steps"] >= 3.0
 
 
-def test_soft_arms_push_a_human_less_at_rest(twin: MujocoTwin) -> None:
-    """A hand that reaches in meets the robot's arm: the softer the arm, the less it stands against it."""
-    meet = {"stepping": 0.0, "arms_forward": 1.0, "human": 3.0, "human_x": 0.85, "human_y": 0.0, "human_start": 1.0}
-    reach = {"reach_x": 0.42, "reach_y": 0.2, "reach_z": 1.0, "reach_duration": 0.8}
-    held = []
-    for strength in (0.0, 1.0):
-        seen = run(twin, 3.0, ((0.5, "soften-arms", strength),), **meet, **reach)
-        held.append(sum(seen.over("contact_force", 2.4, 3.0)))
-    assert held[0] > 0.0
-    assert held[1] < held[0]
+def test_soft_arms_hit_a_human_less_hard_and_withdrawn_arms_not_at_all(twin: MujocoTwin) -> None:
+    pushed = {"stepping": 0.0, "arms_forward": 1.0, "push_impulse": 35.0, "push_time": 1.0}
+    peaks = []
+    for action in ("announce", "soften-arms", "withdraw-arm"):
+        seen = run(twin, 1.6, ((0.5, action, 1.0),), human=1.0, human_x=0.78, human_y=-0.2, **pushed)
+        peaks.append(seen.truth[-1]["contact_force_peak"])
+    assert peaks[0] > peaks[1] > 0.0
+    assert peaks[2] == 0.0
 
 
 def test_yielding_knees_soften_the_fall(twin: MujocoTwin) -> None:

@@ -203,6 +203,7 @@ class Body:
         option = spec.option
         option.timestep, option.gravity = STEP_S, [0.0, 0.0, -_GRAVITY]
         option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a run that diverges must not begin anew
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
         for actuator in list(spec.actuators):
             spec.delete(actuator)

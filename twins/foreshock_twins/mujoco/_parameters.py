@@ -86,6 +86,7 @@ PARAMETERS: Mapping[str, Parameter] = {
     "force_noise": Parameter(2.0, "N", 0.0, 100.0, "sole force"),
     "torque_noise": Parameter(0.2, "N.m", 0.0, 10.0, "sole torque"),
     "human_noise": Parameter(0.01, "m", 0.0, 1.0, "human's position; twice that in m/s for his velocity"),
+    "gaze_noise": Parameter(0.03, "rad", 0.0, 1.0, "where he looks, about each axis"),
     "human_uncertainty": Parameter(0.02, "m", 0.0, 1.0, "position uncertainty that perception reports"),
 }
 """Names that the FMU plants share mean the same here."""
