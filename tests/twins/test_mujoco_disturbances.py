@@ -143,9 +143,9 @@ def test_a_leg_that_walks_into_a_human_is_an_accident_of_mode_a3(twin: MujocoTwi
 
 
 def test_an_arm_stretched_into_the_way_of_a_human_is_an_accident_of_mode_a2(twin: MujocoTwin) -> None:
-    passing = {"stepping": 0.0, "human": 2.0, "human_x": 2.5, "human_y": 0.75, "human_speed": 2.0}
+    passing = {"stepping": 0.0, "human": 2.0, "human_x": 2.5, "human_y": 0.8, "human_speed": 2.0}
     assert not run(twin, 2.5, **passing).events
-    run(twin, 2.5, ((0.3, "arm-reconfiguration", 1.0),), **passing)
+    run(twin, 2.5, ((1.2, "arm-reconfiguration", 1.0),), **passing)
     struck = {e.id: e for e in twin.events()}
     assert struck["arm-strike"].mode == "A2"
     assert struck["arm-strike"].value > 1.0 == struck["arm-strike"].limit
