@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -107,7 +108,7 @@ class Controller:
     def __init__(self, body: Body, period_ns: int) -> None:
         self._body, self._dt = body, period_ns / NS_PER_S
         self._ik = InverseKinematics(body)
-        self._data = body.pin_model.createData()
+        self._data, self._plan_data = body.pin_model.createData(), body.pin_model.createData()
         self._arms_out = body.change(body.robot.arms("arms_out"), "arms_out")
         self._arms_in = body.change(body.robot.arms("arms_in"), "arms_in")
         self._arms_forward = body.change(body.robot.arms("arms_forward"), "arms_forward")
@@ -183,6 +184,13 @@ class Controller:
     def speed_m_s(self) -> float:
         """Planned speed of travel; 0 while it stands."""
         return 0.0 if self.gait.standing else abs(self._length_m) / (self._settings.single_s + self._settings.double_s)
+
+    def planned_link(self, frame: int) -> tuple[Any, Any]:
+        """Pose of a frame in the plan's frame, and its twist in its own axes, as planned (Pinocchio's SE3, Motion)."""
+        model, data = self._body.pin_model, self._plan_data
+        pin.forwardKinematics(model, data, self._ik.q, self._plan_rate)
+        place = pin.updateFramePlacement(model, data, frame)
+        return place, pin.getFrameVelocity(model, data, frame, pin.LOCAL)
 
     # --- state -----------------------------------------------------------------------------------------------------
 

@@ -31,7 +31,7 @@ __all__ = ["MujocoTwin"]
 _SUBSTEPS = round(PERIOD_NS / NS_PER_S / STEP_S)
 _KEPT = 256
 """Measurements that are kept: 1.28 s, more than any latency and lag together."""
-_SENSORS, _CAMERA = 1, 2
+_SENSORS, _CAMERA, _HANDS = 1, 2, 3
 _WARNINGS = mujoco.mjtWarning
 _DIVERGED = tuple(int(getattr(_WARNINGS, f"mjWARN_BAD{k}")) for k in ("QPOS", "QVEL", "QACC", "CTRL"))
 """What MuJoCo counts instead of raising; it would also write MUJOCO_LOG.TXT where the program runs."""
@@ -97,7 +97,7 @@ class MujocoTwin:
         self.model = copy.copy(self._body.model)
         self._data = mujoco.MjData(self.model)
         self._disturbances.reset(p, self.model, self._data)
-        self._sensors.reset(p, np.random.default_rng([seed % 2**63, _SENSORS]))
+        self._sensors.reset(p, *(np.random.default_rng([seed % 2**63, k]) for k in (_SENSORS, _HANDS)))
         self._people.reset(p, self.model, self._data, np.random.default_rng([seed % 2**63, _CAMERA]))
         q = self._control.reset(p)
         self._data.qpos[:] = self._body.mujoco_q(q)
