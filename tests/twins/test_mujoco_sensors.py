@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
-mujoco = pytest.importorskip("mujoco")
-pin = pytest.importorskip("pinocchio")
+pytest.importorskip("mujoco")
+pytest.importorskip("pinocchio")
 
+import mujoco
+import pinocchio as pin
 from mujoco_runs import TICK_NS, new_twin
 
 from foreshock.messages import Imu, JointState, Odometry, WrenchStamped
@@ -160,3 +162,25 @@ def test_contact_torque_of_a_push_shows_as_zmp_beside_the_model(twin: MujocoTwin
     now = streamed(twin, list(twin.advance(800_000_000)))
     q, _ = state(twin, now)
     assert wrench_pressure(twin, q, now) == pytest.approx(contact_pressure(twin), abs=1e-6)
+
+
+def test_hands_feel_see_and_plan_the_same_attitude(twin: MujocoTwin) -> None:
+    twin.reset({**QUIET, "stepping": 0.0, "object_tilt_noise": 0.0, "object_noise": 0.0, "arms_forward": 1.0}, 1)
+    now = streamed(twin, list(twin.advance(2_000_000_000)))
+    for side in ("left", "right"):
+        imu, seen, command, arm = (
+            now[f"{side}_{name}"]
+            for name in ("gripper/imu", "gripper/object", "gripper/object_command", "arm/odometry")
+        )
+        assert isinstance(imu, Imu)
+        assert isinstance(seen, Odometry)
+        assert isinstance(command, Odometry)
+        assert isinstance(arm, Odometry)
+        assert imu.orientation == seen.orientation
+        # MuJoCo's site and Pinocchio's frame; q and -q are one rotation
+        assert abs(np.dot(seen.orientation, arm.orientation)) == pytest.approx(1.0, abs=1e-9)
+        assert seen.position == pytest.approx(arm.position, abs=1e-9)
+        # servos that carry the arms leave some milliradians, and the legs some millimetres
+        assert abs(np.dot(seen.orientation, command.orientation)) > np.cos(0.5 * 0.02)
+        assert seen.position == pytest.approx(command.position, abs=0.015)
+        assert math.hypot(*imu.linear_acceleration) == pytest.approx(9.81, rel=5e-3)

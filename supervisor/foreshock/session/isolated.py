@@ -85,12 +85,14 @@ _ROOM = 24
 
 
 def placed(table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """A twin's table with its paths starting from a folder, those of its parts as well."""
+    """A twin's table with its paths starting from a folder, those of its parts and of its robot as well."""
     result = dict(table)
-    for key in ("fmu", "binding", "plant"):
+    for key in ("fmu", "binding", "plant", "model", "srdf"):
         value = table.get(key)
         if isinstance(value, str) and value and (key != "plant" or "/" in value):
             result[key] = str(folder / value)
+    if isinstance(robot := table.get("robot"), dict):
+        result["robot"] = placed(robot, folder)
     parts = table.get("parts")
     if isinstance(parts, dict):
         result["parts"] = {k: placed(v, folder) if isinstance(v, dict) else v for k, v in parts.items()}

@@ -21,6 +21,7 @@ PERIOD_NS = 5_000_000
 """Tick of control and sensors: 200 Hz."""
 
 _PATH_POINTS, _PATH_S = 16, 3.0
+_STILL = (0.0, 0.0, 0.0)
 
 
 class Channels:
@@ -36,7 +37,6 @@ class Channels:
         self._body, self._control = body, control
         self._data = body.pin_model.createData()
         self._names = body.joints
-        hands = [(s, getattr(body.robot, f"{s}_hand")) for s in SIDES]
         self.measured: list[tuple[str, str, int, Callable[[Measured], AnyMessage]]] = [
             ("joints/state", "JointState", 1, self._joints),
             ("base/odometry", "Odometry", 1, self._base),
@@ -46,10 +46,11 @@ class Channels:
             ("left_foot/odometry", "Odometry", 4, lambda m: self._link(m, body.soles[0], "left_sole")),
             ("right_foot/odometry", "Odometry", 4, lambda m: self._link(m, body.soles[1], "right_sole")),
         ]
-        for side, link in hands:
-            if link:
-                frame = body.pin_model.getFrameId(link)
-                self.measured.append((f"{side}_arm/odometry", "Odometry", 2, self._hand(frame, link)))
+        self._frames = [body.pin_model.getFrameId(link) for _, link in body.hands]
+        for k, (side, link) in enumerate(body.hands):
+            self.measured.append((f"{side}_arm/odometry", "Odometry", 2, self._hand(self._frames[k], link)))
+            self.measured.append((f"{side}_gripper/imu", "Imu", 2, self._hand_imu(k, link)))
+            self.measured.append((f"{side}_gripper/object", "Odometry", 2, self._held(k, f"{side}_object")))
         self.planned: list[tuple[str, str, int, Callable[[], AnyMessage]]] = [
             ("joints/plan", "JointState", 2, self._joint_plan),
             ("plan/motion", "MotionPlan", 1, self._motion_plan),
@@ -57,6 +58,9 @@ class Channels:
             ("right_foot/plan", "Odometry", 4, lambda: self._foot_plan(1)),
             ("plan/path", "PlannedPath", 20, self._path),
         ]
+        for k, (side, _) in enumerate(body.hands):
+            command = self._commanded(self._frames[k], f"{side}_object")
+            self.planned.append((f"{side}_gripper/object_command", "Odometry", 2, command))
         self.declared = tuple(Channel(n, t, every * PERIOD_NS) for n, t, every, _ in (*self.measured, *self.planned))
 
     def _joints(self, m: Measured) -> AnyMessage:
@@ -78,6 +82,37 @@ class Channels:
 
     def _hand(self, frame: int, link: str) -> Callable[[Measured], AnyMessage]:
         return lambda m: self._link(m, frame, link)
+
+    def _hand_imu(self, hand: int, link: str) -> Callable[[Measured], AnyMessage]:
+        def message(m: Measured) -> AnyMessage:
+            h = m.hands[hand]
+            return Imu(_vector(h.attitude), _vector(h.gyro), _vector(h.acceleration), link)
+
+        return message
+
+    def _held(self, hand: int, name: str) -> Callable[[Measured], AnyMessage]:
+        """What the hand holds, as a camera sees it; it is held firmly, in the hand's axes."""
+
+        def message(m: Measured) -> AnyMessage:
+            h = m.hands[hand]
+            return Odometry(_vector(h.place), _vector(h.attitude), _STILL, _STILL, "odom", name)
+
+        return message
+
+    def _commanded(self, frame: int, name: str) -> Callable[[], AnyMessage]:
+        """The same as the plan has it."""
+
+        def message() -> AnyMessage:
+            place, twist = self._control.planned_link(frame)
+            plane = self._control.frame
+            x, y = plane.out(float(place.translation[0]), float(place.translation[1]))
+            turned = pin.Quaternion(pin.AngleAxis(plane.yaw, np.array([0.0, 0.0, 1.0]))) * pin.Quaternion(
+                place.rotation
+            )
+            at = (x, y, float(place.translation[2]))
+            return Odometry(at, _vector(turned.coeffs()), _vector(twist.linear), _vector(twist.angular), "odom", name)
+
+        return message
 
     def _link(self, m: Measured, frame: int, name: str) -> AnyMessage:
         """Pose and twist of a frame by kinematics from what was measured."""

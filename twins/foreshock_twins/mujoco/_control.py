@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -107,7 +108,7 @@ class Controller:
     def __init__(self, body: Body, period_ns: int) -> None:
         self._body, self._dt = body, period_ns / NS_PER_S
         self._ik = InverseKinematics(body)
-        self._data = body.pin_model.createData()
+        self._data, self._plan_data = body.pin_model.createData(), body.pin_model.createData()
         self._arms_out = body.change(body.robot.arms("arms_out"), "arms_out")
         self._arms_in = body.change(body.robot.arms("arms_in"), "arms_in")
         self._arms_forward = body.change(body.robot.arms("arms_forward"), "arms_forward")
@@ -154,6 +155,7 @@ class Controller:
         self._plan_acceleration: Floats = np.zeros(body.pin_model.nv)
         self._torque = self._ik.torques(self._plan_rate, self._plan_acceleration, (0.5, 0.5))[body.pin_v]
         self._released_s = self._length_m = 0.0
+        self._jumps = 0
         self._stiffness, self._damping = body.stiffness.copy(), body.damping.copy()
         self.target = q + self._torque / self._stiffness
         self.soles: list[tuple[float, float, float, float]] = [(f.x, f.y, 0.0, 0.0) for f in feet]
@@ -182,6 +184,13 @@ class Controller:
     def speed_m_s(self) -> float:
         """Planned speed of travel; 0 while it stands."""
         return 0.0 if self.gait.standing else abs(self._length_m) / (self._settings.single_s + self._settings.double_s)
+
+    def planned_link(self, frame: int) -> tuple[Any, Any]:
+        """Pose of a frame in the plan's frame, and its twist in its own axes, as planned (Pinocchio's SE3, Motion)."""
+        model, data = self._body.pin_model, self._plan_data
+        pin.forwardKinematics(model, data, self._ik.q, self._plan_rate)
+        place = pin.updateFramePlacement(model, data, frame)
+        return place, pin.getFrameVelocity(model, data, frame, pin.LOCAL)
 
     # --- state -----------------------------------------------------------------------------------------------------
 
@@ -249,6 +258,7 @@ class Controller:
             asked = max(self.asked["step-suppression"], self.asked["minimal-risk"])
             place, rate = f.into(float(c[0]), float(c[1])), f.vector_into(float(v[0]), float(v[1]))
             gait.suppress(asked, _LANDING_S, place, rate)
+            self._jumps = 2
         elif gait.settling:
             self._released_s = self._released_s + self._dt if suppressed == 0.0 and gait.settled() else 0.0
             if self._released_s >= _RESUME_S:
@@ -275,6 +285,10 @@ class Controller:
 
     def _feed_forward(self, v: Floats) -> None:
         """Torques that the plan needs; the targets lead the plan by so much that the servos give them."""
+        if self._jumps:  # the plan starts anew from where the robot is: no motion to give torques for
+            self._jumps -= 1
+            self._plan_rate = v
+            return
         a = (v - self._plan_rate) / self._dt
         self._plan_rate = v
         weight = self._dt / (self._dt + _FORWARD_FILTER_S)

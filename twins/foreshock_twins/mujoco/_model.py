@@ -203,6 +203,7 @@ class Body:
         option = spec.option
         option.timestep, option.gravity = STEP_S, [0.0, 0.0, -_GRAVITY]
         option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a run that diverges must not begin anew
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
         for actuator in list(spec.actuators):
             spec.delete(actuator)
@@ -298,16 +299,20 @@ class Body:
     def _mount_sensors(self, spec: Any) -> None:
         """Inertial unit in the torso's frame, and sites on the soles."""
         places = [("torso-imu", self.torso), *((f"{s}-sole", f) for s, f in zip(SIDES, self.soles, strict=True))]
+        self.hands = tuple((s, link) for s in SIDES if (link := getattr(self.robot, f"{s}_hand")))
+        places += [(f"{s}-hand", self._frame(link, f"{s}_hand")) for s, link in self.hands]
         for name, frame in places:
             body, placement = self._carrier(spec, frame)
             body.add_site(name=name, pos=placement.translation, quat=_wxyz(placement.rotation), group=5)
-        for name, kind in (
-            ("torso-gyro", mujoco.mjtSensor.mjSENS_GYRO),
-            ("torso-accelerometer", mujoco.mjtSensor.mjSENS_ACCELEROMETER),
-        ):
-            spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="torso-imu")
-        # computing a force sensor makes MuJoCo sum the contacts of every body (cfrc_ext)
         site = mujoco.mjtObj.mjOBJ_SITE
+        units = [("torso", "torso-imu"), *((f"{s}-hand", f"{s}-hand") for s, _ in self.hands)]
+        for name, place in units:
+            for quantity, kind in (
+                ("gyro", mujoco.mjtSensor.mjSENS_GYRO),
+                ("accelerometer", mujoco.mjtSensor.mjSENS_ACCELEROMETER),
+            ):
+                spec.add_sensor(name=f"{name}-{quantity}", type=kind, objtype=site, objname=place)
+        # computing a force sensor makes MuJoCo sum the contacts of every body (cfrc_ext)
         spec.add_sensor(name="sole-force", type=mujoco.mjtSensor.mjSENS_FORCE, objtype=site, objname="left-sole")
 
     def _carrier(self, spec: Any, frame: int) -> tuple[Any, Any]:

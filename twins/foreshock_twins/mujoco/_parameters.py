@@ -85,7 +85,10 @@ PARAMETERS: Mapping[str, Parameter] = {
     "accelerometer_noise": Parameter(0.05, "m/s2", 0.0, 10.0, "specific force"),
     "force_noise": Parameter(2.0, "N", 0.0, 100.0, "sole force"),
     "torque_noise": Parameter(0.2, "N.m", 0.0, 10.0, "sole torque"),
+    "object_tilt_noise": Parameter(0.004, "rad", 0.0, 0.1, "orientation of what a hand holds, seen, about each axis"),
+    "object_noise": Parameter(0.002, "m", 0.0, 0.1, "place of what a hand holds, seen"),
     "human_noise": Parameter(0.01, "m", 0.0, 1.0, "human's position; twice that in m/s for his velocity"),
+    "gaze_noise": Parameter(0.03, "rad", 0.0, 1.0, "where he looks, about each axis"),
     "human_uncertainty": Parameter(0.02, "m", 0.0, 1.0, "position uncertainty that perception reports"),
 }
 """Names that the FMU plants share mean the same here."""

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from foreshock.clock import NS_PER_S
-from foreshock.messages import Capsule, HumanPose, Humans
+from foreshock.messages import Capsule, Gaze, HumanPose, Humans
 from foreshock.twin import Channel
 from foreshock_twins.mujoco._contact import HumanContacts, Touch, untouchable
 from foreshock_twins.mujoco._human import PARTS, HumanMotion, HumanSettings, MovedHuman, add_human, apply
@@ -22,6 +22,7 @@ ID = "human-1"
 PERIOD_NS = 40_000_000
 """A camera at 25 Hz."""
 
+_POSE, _GAZE = "humans/pose", f"{ID}/gaze"
 _MOTIONS = ("stand", "walk-past", "reach-in")
 
 
@@ -34,14 +35,17 @@ def furnish(spec: Any) -> None:
 
 
 class People:
-    """Nobody, or one human.
+    """Nobody, or one human. He looks at the robot, or ahead while he walks past.
+
+    Attributes:
+        channels: what perception tells of him.
 
     Args:
         model: compiled MuJoCo model with the human.
     """
 
     def __init__(self, model: Any) -> None:
-        self.channel = Channel("humans/pose", "Humans", PERIOD_NS)
+        self.channels = (Channel(_POSE, "Humans", PERIOD_NS), Channel(_GAZE, "Gaze", PERIOD_NS))
         self._rows = [int(model.body_mocapid[model.body(f"human-{p.name}").id]) for p in PARTS]
         self._contacts = HumanContacts(model, [(f"human-{p.name}", p.region) for p in PARTS])
 
@@ -55,7 +59,7 @@ class People:
         self._p, self._model, self._data, self._rng = p, model, data, rng
         self._contacts.reset()
         self._motion: HumanMotion | None = None
-        self._waiting: deque[tuple[int, Humans]] = deque()
+        self._waiting: deque[tuple[int, Humans, Gaze]] = deque()
         kind = round(p["human"])
         if kind > 0:
             settings = HumanSettings(
@@ -85,7 +89,8 @@ class People:
             self._velocities = self._way * (NS_PER_S / 5_000_000)
             apply(self._model, self._data, self._now)
         if until_ns % PERIOD_NS == 0:
-            self._waiting.append((until_ns, Humans((self._perceived(self._next),))))
+            pose = self._perceived(self._next)
+            self._waiting.append((until_ns, Humans((pose,)), self._looks(pose)))
 
     def go(self, share: float) -> None:
         """Be where he is after a share of the tick."""
@@ -103,15 +108,29 @@ class People:
         """Contact forces at this step, see HumanContacts."""
         return self._contacts.apply(self._model, self._data, self._velocities, dt)
 
-    def seen(self, now_ns: int) -> Iterator[tuple[int, Humans]]:
-        """What perception delivers now, with the stamp of the image; an empty scene if nobody is there."""
+    def seen(self, now_ns: int) -> Iterator[tuple[int, str, Humans | Gaze]]:
+        """What perception delivers now: stamp of the image, channel, message; an empty scene if nobody is there."""
         if self._motion is None:
             if now_ns % PERIOD_NS == 0:
-                yield now_ns, Humans(())
+                yield now_ns, _POSE, Humans(())
+                yield now_ns, _GAZE, Gaze(ID, (1.0, 0.0, 0.0), 0.0)
             return
         latency = round(self._p["camera_latency"] * NS_PER_S)
         while self._waiting and self._waiting[0][0] + latency <= now_ns:
-            yield self._waiting.popleft()
+            stamp_ns, pose, gaze = self._waiting.popleft()
+            yield stamp_ns, _POSE, pose
+            yield stamp_ns, _GAZE, gaze
+
+    def _looks(self, pose: HumanPose) -> Gaze:
+        """From the middle of his head to the robot's base, or where he walks to."""
+        head = pose.capsules[0]
+        at = 0.5 * (np.array(head.a) + np.array(head.b))
+        yaw = self._p["human_yaw"]
+        ahead = np.array((np.cos(yaw), np.sin(yaw), 0.0))
+        way = ahead if _MOTIONS[round(self._p["human"]) - 1] == "walk-past" else self._data.qpos[:3] - at
+        way = way / np.linalg.norm(way) + self._p["gaze_noise"] * self._rng.standard_normal(3)
+        way /= np.linalg.norm(way)
+        return Gaze(ID, (float(way[0]), float(way[1]), float(way[2])))
 
     def _perceived(self, moved: MovedHuman) -> HumanPose:
         """One noisy offset for the whole body, as of a tracker, and a noisy velocity."""

@@ -13,7 +13,7 @@ __all__ = ["RobotConfig", "robot_files", "share_folder"]
 
 _TALOS = Path("example-robot-data/robots/talos_data")
 _TALOS_ARMS = {
-    "arms_out": {"arm_left_2_joint": 0.8, "arm_right_2_joint": -0.8},
+    "arms_out": {"arm_left_2_joint": 0.6, "arm_right_2_joint": -0.6},
     "arms_in": {
         "arm_left_1_joint": 0.215,
         "arm_left_2_joint": -0.123,
@@ -33,7 +33,7 @@ _TALOS_ARMS = {
         "arm_right_4_joint": -0.560,
     },
 }
-"""From half_sitting: hands 0.44 m beside the middle go to 0.75 m; beside the thighs; 0.48 m ahead and 0.95 m high."""
+"""From half_sitting: hands out as far as the shoulders hold them; beside the thighs; 0.48 m ahead and 0.95 m high."""
 
 
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -11,7 +11,16 @@ import numpy as np
 
 from foreshock_twins.mujoco._model import Body, Floats
 
-__all__ = ["Measured", "Sensors", "noisy_quaternion"]
+__all__ = ["Hand", "Measured", "Sensors", "noisy_quaternion"]
+
+
+class Hand(msgspec.Struct, frozen=True):
+    """A hand's angular velocity (rad/s) and specific force (m/s2) in its axes, its attitude (xyzw) and place (m)."""
+
+    gyro: Floats
+    acceleration: Floats
+    attitude: Floats
+    place: Floats
 
 
 class Measured(msgspec.Struct, frozen=True):
@@ -26,6 +35,7 @@ class Measured(msgspec.Struct, frozen=True):
         gyro: of the torso, in its axes (rad/s).
         acceleration: specific force at the torso, in its axes (m/s2).
         wrenches: ground on each sole in its frame, shape (2, 6): force (N), torque (N m).
+        hands: of each hand, by a unit of its own and as a camera sees it.
     """
 
     stamp_ns: int
@@ -36,6 +46,7 @@ class Measured(msgspec.Struct, frozen=True):
     gyro: Floats
     acceleration: Floats
     wrenches: Floats
+    hands: tuple[Hand, ...] = ()
 
 
 class Sensors:
@@ -47,12 +58,18 @@ class Sensors:
         self._gyro, self._accelerometer = (int(m.sensor(n).adr[0]) for n in ("torso-gyro", "torso-accelerometer"))
         self.torso_site = m.site("torso-imu").id
         self.sole_sites = tuple(m.site(f"{s}-sole").id for s in ("left", "right"))
+        self._hands = [
+            (*(int(m.sensor(f"{s}-hand-{k}").adr[0]) for k in ("gyro", "accelerometer")), m.site(f"{s}-hand").id)
+            for s, _ in body.hands
+        ]
         self._draws = 12 + 3 * len(body.joints) + 9 + 12
 
-    def reset(self, parameters: Mapping[str, float], rng: np.random.Generator) -> None:
-        """Begin a run."""
+    def reset(self, parameters: Mapping[str, float], rng: np.random.Generator, hands_rng: np.random.Generator) -> None:
+        """Begin a run; the hands have a random stream of their own."""
         p, n = parameters, len(self._body.joints)
-        self._rng = rng
+        self._rng, self._hands_rng = rng, hands_rng
+        names = ("gyro_noise", "accelerometer_noise", "object_tilt_noise", "object_noise")
+        self._hand_sd = np.repeat([p[name] for name in names], 3)
         self._sd = np.concatenate(
             [
                 np.full(3, p["base_noise"]),
@@ -89,7 +106,19 @@ class Sensors:
         acceleration = data.sensordata[self._accelerometer : self._accelerometer + 3] + noise[at + 6 : at + 9]
         wrenches = self.true_wrenches(data)
         wrenches += noise[at + 9 :].reshape(2, 6)
-        return Measured(stamp_ns, q, v, effort, attitude, gyro, acceleration, wrenches)
+        hands = tuple(self._hand(data, *hand) for hand in self._hands)
+        return Measured(stamp_ns, q, v, effort, attitude, gyro, acceleration, wrenches, hands)
+
+    def _hand(self, data: Any, gyro: int, accelerometer: int, site: int) -> Hand:
+        noise = self._hand_sd * self._hands_rng.standard_normal(12)
+        attitude = np.empty(4)
+        mujoco.mju_mat2Quat(attitude, data.site_xmat[site])
+        return Hand(
+            data.sensordata[gyro : gyro + 3] + noise[:3],
+            data.sensordata[accelerometer : accelerometer + 3] + noise[3:6],
+            noisy_quaternion(attitude[[1, 2, 3, 0]], noise[6:9]),
+            data.site_xpos[site] + noise[9:],
+        )
 
     def true_wrenches(self, data: Any) -> Floats:
         """What the ground exerts on each sole, in its frame and about its origin, shape (2, 6): force, torque.

@@ -31,7 +31,11 @@ __all__ = ["MujocoTwin"]
 _SUBSTEPS = round(PERIOD_NS / NS_PER_S / STEP_S)
 _KEPT = 256
 """Measurements that are kept: 1.28 s, more than any latency and lag together."""
-_SENSORS, _CAMERA = 1, 2
+_SENSORS, _CAMERA, _HANDS = 1, 2, 3
+_WARNINGS = mujoco.mjtWarning
+_DIVERGED = tuple(int(getattr(_WARNINGS, f"mjWARN_BAD{k}")) for k in ("QPOS", "QVEL", "QACC", "CTRL"))
+"""What MuJoCo counts instead of raising; it would also write MUJOCO_LOG.TXT where the program runs."""
+mujoco.set_mju_user_warning(lambda _: None)
 _LOADED_N = 10.0
 _NEAR_M, _FALL_M = 1.0, 2.0
 """A human farther than this from the base, beyond arms (and a fall), is not looked for at each step."""
@@ -65,7 +69,7 @@ class MujocoTwin:
     @property
     def channels(self) -> Sequence[Channel]:
         """What it streams."""
-        return (*self._out.declared, self._people.channel)
+        return (*self._out.declared, *self._people.channels)
 
     @property
     def period_ns(self) -> int:
@@ -93,7 +97,7 @@ class MujocoTwin:
         self.model = copy.copy(self._body.model)
         self._data = mujoco.MjData(self.model)
         self._disturbances.reset(p, self.model, self._data)
-        self._sensors.reset(p, np.random.default_rng([seed % 2**63, _SENSORS]))
+        self._sensors.reset(p, *(np.random.default_rng([seed % 2**63, k]) for k in (_SENSORS, _HANDS)))
         self._people.reset(p, self.model, self._data, np.random.default_rng([seed % 2**63, _CAMERA]))
         q = self._control.reset(p)
         self._data.qpos[:] = self._body.mujoco_q(q)
@@ -201,7 +205,9 @@ class MujocoTwin:
         model.actuator_biasprm[a, 1] = -stiffness
         model.actuator_biasprm[a, 2] = -damping
         self._physics(now_ns)
-        if not math.isfinite(float(data.qpos.sum() + data.qvel.sum())):
+        if any(data.warning[w].number for w in _DIVERGED) or not math.isfinite(
+            float(data.qpos.sum() + data.qvel.sum())
+        ):
             self._ready = False
             raise TwinError("nan", f"the physics has diverged at {now_ns / NS_PER_S:.3f} s")
         mujoco.mj_forward(model, data)
@@ -266,8 +272,8 @@ class MujocoTwin:
         for name, _, every, make_plan in self._out.planned:
             if self._tick % every == 0:
                 self._send(samples, now_ns, name, make_plan())
-        for stamp_ns, message in self._people.seen(now_ns):
-            self._send(samples, stamp_ns, self._people.channel.name, message)
+        for stamp_ns, name, message in self._people.seen(now_ns):
+            self._send(samples, stamp_ns, name, message)
 
     def _send(self, samples: list[Sample], stamp_ns: int, name: str, message: Any) -> None:
         number = self._sequence.get(name, 0)
