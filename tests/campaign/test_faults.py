@@ -83,7 +83,7 @@ def test_each_fault_is_held_against_the_same_runs_without_it(plan: Plan) -> None
     assert {e.fault: e.effects for e in found.values()} == {
         "blind": ("more false interventions",),
         "late": ("more accidents",),
-        "fall-only": ("none shown",),
+        "fall-only": ("not significant",),
     }
     assert (found["late"].failures, list(found["late"].where)) == (1, [FALL])
     stops = sm_mcnemar([[0, 0], [20, 0]], exact=True).pvalue

@@ -128,7 +128,7 @@ def test_share_of_time_is_the_weighted_regression_through_the_origin() -> None:
     wholes = RNG.uniform(5.0, 20.0, 30)
     parts = wholes * RNG.uniform(0.1, 0.5, 30)
     found = share_of_time(list(parts), list(wholes))
-    fit = sm.WLS(parts, wholes, weights=1.0 / wholes).fit(cov_type="HC1")
+    fit = sm.WLS(parts, wholes, weights=1.0 / wholes).fit(cov_type="HC1", use_t=True)
     assert found.share == pytest.approx(fit.params[0], rel=EXACT)
     assert (found.low, found.high) == pytest.approx(tuple(fit.conf_int(0.05)[0]), rel=EXACT)
     assert found.hours == pytest.approx(sum(wholes) / 3600.0)
@@ -139,6 +139,13 @@ def test_no_time_at_reduced_speed_in_few_runs_is_not_never() -> None:
     assert share_of_time([10.0] * 30, [10.0] * 30).low == pytest.approx(0.9)
     assert (share_of_time([3.0], [10.0]).low, share_of_time([3.0], [10.0]).high) == (0.0, 1.0)
     assert share_of_time([], []).n == 0
+
+
+def test_runs_that_are_all_alike_do_not_make_a_certainty() -> None:
+    """Two runs at 13% do not say that it is always 13%; of 30 alike, a tenth may be anything."""
+    two, many = share_of_time([1.3] * 2, [10.0] * 2), share_of_time([1.3] * 30, [10.0] * 30)
+    assert (two.share, two.low, two.high) == pytest.approx((0.13, 0.0, 1.0))
+    assert (many.low, many.high) == pytest.approx((0.13 * 0.9, 0.13 + 0.87 * 0.1))
 
 
 def test_quartiles_of_times_that_were_not_reached() -> None:

@@ -130,6 +130,13 @@ def test_first_places_leave_out_what_ran_in_part_of_the_scenarios(plan: Plan) ->
     assert overall.reduced[0] == ("on",)
 
 
+def test_an_arm_that_is_not_done_yet_is_not_left_out(plan: Plan) -> None:
+    """Cut short before the last scenario, "none" alone has all: that makes it no winner."""
+    table = [r for r in rows(plan, story) if r.arm == "none" or r.scenario == FALL]
+    overall = standings_of(plan, results_of(plan, table))[0]
+    assert overall.accidents[0] == ("baseline", "always")
+
+
 def test_what_an_arm_costs_and_how_long_until_it_is_safe(plan: Plan) -> None:
     found = {r.arm: r for r in results_of(plan, rows(plan, story)) if r.scope.kind == "overall"}
     assert found["on"].reduced is not None

@@ -19,7 +19,7 @@ __all__ = ["LEVEL", "FaultEffect", "fault_effects"]
 
 LEVEL = 0.05
 """Chance that any fault of a campaign is said to do something where none does anything."""
-Effect: TypeAlias = Literal["more accidents", "more false interventions", "none shown"]
+Effect: TypeAlias = Literal["more accidents", "more false interventions", "not significant"]
 
 
 class FaultEffect(msgspec.Struct, frozen=True):
@@ -60,7 +60,7 @@ class FaultEffect(msgspec.Struct, frozen=True):
             found.append("more accidents")
         if self.false_p < LEVEL and self.false.k > self.false_without.k:
             found.append("more false interventions")
-        return tuple(found) or ("none shown",)
+        return tuple(found) or ("not significant",)
 
 
 def fault_effects(plan: Plan, rows: Sequence[Row]) -> list[FaultEffect]:

@@ -127,7 +127,7 @@ def _p(pairs: Sequence[tuple[float, float]], *, events: bool) -> float:
 
 
 def standings_of(plan: Plan, results: Sequence[ArmResult]) -> list[Standing]:
-    """Who is first, overall and per mode; arms that ran in only some of a part's scenarios are left out.
+    """Who is first, overall and per mode; arms that are to run in only some of a part's scenarios are left out.
 
     Args:
         plan: of the campaign.

@@ -16,7 +16,7 @@ from foreshock.campaign.forecast import Bin, Brier, Discrimination, auc_differen
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.outcomes import Outcomes, seat_of
 from foreshock.campaign.paired import PairedDifference, paired_difference
-from foreshock.campaign.plan import Plan
+from foreshock.campaign.plan import Case, Plan
 from foreshock.campaign.spec import ArmEntry
 from foreshock.campaign.times import Times, TimeShare, share_of_time
 from foreshock.session.rates import Frequency, Rate, per_hour, wilson
@@ -60,7 +60,7 @@ class ArmResult(msgspec.Struct, frozen=True):
         brier: of P, for an arm in shadow.
         reliability: of P, likewise.
         discrimination: of P, likewise.
-        scenarios: in which it ran.
+        scenarios: in which it is to run, whether it has yet or not.
     """
 
     scope: Scope
@@ -93,9 +93,9 @@ class ArmResult(msgspec.Struct, frozen=True):
         return low, middle, high
 
 
-def scopes_of(rows: Sequence[Row]) -> list[tuple[Scope, Callable[[Row], bool]]]:
+def scopes_of(rows: Sequence[Row]) -> list[tuple[Scope, Callable[[Row | Case], bool]]]:
     """Every part that is reported, and whether a run belongs to it."""
-    found: list[tuple[Scope, Callable[[Row], bool]]] = [(Scope("overall"), lambda r: not r.fault)]
+    found: list[tuple[Scope, Callable[[Row | Case], bool]]] = [(Scope("overall"), lambda r: not r.fault)]
     modes = sorted({r.mode for r in rows}, key=lambda m: (len(m), m))
     found += [(Scope("mode", m), lambda r, m=m: r.mode == m and not r.fault) for m in modes]  # type: ignore[misc]  # m is bound here
     scenarios = list(dict.fromkeys(r.scenario for r in rows))
@@ -129,7 +129,15 @@ def results_of(plan: Plan, rows: Sequence[Row]) -> list[ArmResult]:
             if belongs(r):
                 by_arm.setdefault(r.arm, []).append(r)
         shadow = first, by_arm.get(first, [])
-        found += [_judged(scope, a, by_arm[a.id], outcomes, shadow) for a in plan.spec.arms if a.id in by_arm]
+        planned: dict[str, set[str]] = {}
+        for c in plan.cases:
+            if belongs(c):
+                planned.setdefault(c.arm, set()).add(c.scenario)
+        found += [
+            _judged(scope, a, by_arm[a.id], outcomes, shadow, len(planned.get(a.id, ())))
+            for a in plan.spec.arms
+            if a.id in by_arm
+        ]
     return found
 
 
@@ -139,7 +147,12 @@ def forecasts(rows: Sequence[Row]) -> list[Row]:
 
 
 def _judged(
-    scope: Scope, arm: ArmEntry, mine: Sequence[Row], outcomes: Outcomes, first: tuple[str, Sequence[Row]]
+    scope: Scope,
+    arm: ArmEntry,
+    mine: Sequence[Row],
+    outcomes: Outcomes,
+    first: tuple[str, Sequence[Row]],
+    scenarios: int,
 ) -> ArmResult:
     reference = outcomes.reference
     runs = [r for r in mine if r.ok]
@@ -174,7 +187,7 @@ def _judged(
         brier(p, happened),
         reliability(p, happened),
         _told_apart(told, p, happened, None if arm.id == first[0] else first),
-        len({r.scenario for r in mine}),
+        scenarios,
     )
 
 

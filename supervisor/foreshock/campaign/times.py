@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from statistics import NormalDist
 
 import msgspec
 
 __all__ = ["TimeShare", "Times", "share_of_time"]
-
-Z = NormalDist().inv_cdf(0.975)
 
 
 class TimeShare(msgspec.Struct, frozen=True):
@@ -52,8 +49,9 @@ def share_of_time(parts_s: Sequence[float], wholes_s: Sequence[float]) -> TimeSh
     """The ratio estimate R = sum of parts / sum of wholes.
 
     Its variance is n / (n - 1) * sum (part - R whole)^2 / (sum of wholes)^2 (Cochran, Sampling Techniques, 3rd ed.,
-    6.3), within 0 and 1; of a single run the interval is all of it. Where no run differs from the others that says
-    nothing, and the end of the interval is that of the rule of three, 3 / n.
+    6.3), the interval that of Student's t with n - 1 degrees of freedom, within 0 and 1; of a single run it is all of
+    it. Where no run differs from the others that variance says nothing: by the rule of three up to 3 / n of the runs
+    may be of any other kind.
     """
     n, whole = len(parts_s), sum(wholes_s)
     if not n or not whole:
@@ -62,10 +60,11 @@ def share_of_time(parts_s: Sequence[float], wholes_s: Sequence[float]) -> TimeSh
     if n == 1:
         return TimeShare(share, 0.0, 1.0, 1, whole / 3600.0)
     rest = sum((p - share * w) ** 2 for p, w in zip(parts_s, wholes_s, strict=True))
-    half = Z * math.sqrt(n / (n - 1) * rest) / whole
+    if rest <= (1e-9 * whole) ** 2:
+        others = min(3.0 / n, 1.0)
+        return TimeShare(share, share * (1.0 - others), share + (1.0 - share) * others, n, whole / 3600.0)
+    from scipy.stats import t
+
+    half = float(t.ppf(0.975, n - 1)) * math.sqrt(n / (n - 1) * rest) / whole
     low, high = max(share - half, 0.0), min(share + half, 1.0)
-    if share == 0.0:
-        high = min(3.0 / n, 1.0)
-    elif share >= 1.0:
-        low = max(1.0 - 3.0 / n, 0.0)
     return TimeShare(share, low, high, n, whole / 3600.0)
