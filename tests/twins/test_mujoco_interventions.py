@@ -44,6 +44,13 @@ def test_what_helps_depends_on_the_disturbance(twin: MujocoTwin) -> None:
     assert run(twin, 7.0, lock, **ICE).fell
 
 
+def test_on_slick_ice_stronger_feedback_undoes_what_a_suppressed_step_saves(twin: MujocoTwin) -> None:
+    slick = {**ICE, "drop_mu": 0.01}
+    step = (4.38, "step-suppression", 1.0)
+    assert not run(twin, 6.5, (step,), **slick).fell
+    assert run(twin, 6.5, (step, (4.38, "balance-lock", 1.0)), **slick).fell
+
+
 def test_a_suppressed_step_puts_the_foot_down_and_the_walk_goes_on_after_release(twin: MujocoTwin) -> None:
     # at 3.1 s the first foot is in the air
     asked = ((3.1, "step-suppression", 1.0), (5.0, "step-suppression", 0.0))
