@@ -147,3 +147,14 @@ def test_quartiles_of_times_that_were_not_reached() -> None:
     assert times.quartiles_s == (2.0, 3.0, math.inf)
     assert list(times.quartiles_s) == [np.quantile(times.values_s, q, method="inverted_cdf") for q in (0.25, 0.5, 0.75)]
     assert Times(()).quartiles_s is None
+
+
+def test_many_runs_need_no_table_of_all_pairs() -> None:
+    """2 x 50,000 runs, whose pairs would take 20 GB; the area is that of scikit-learn."""
+    rng = np.random.default_rng(2)
+    truth = np.repeat([True, False], 50_000)
+    p = np.round(rng.normal(size=100_000) + truth, 2)  # with ties
+    found = discrimination(p.tolist(), truth.tolist())
+    assert found is not None
+    assert found.auc == pytest.approx(roc_auc_score(truth, p), abs=EXACT)
+    assert found.low < found.auc < found.high

@@ -91,6 +91,14 @@ def test_results_are_what_was_run_and_parquet_says_the_same_as_json(smoke: Path)
     assert overall["shadow"]["difference.only_first"] == overall["shadow"]["difference.only_second"] == 0
 
 
+def test_a_comparison_of_nothing_is_no_good_news(smoke: Path, campaign_file: Path, tmp_path: Path) -> None:
+    """Both have an arm none, but no scenario in common; and a campaign that was cut short says so."""
+    other = tmp_path / "other"
+    foreshock("run", str(campaign_file), "--out", str(other), "--workers", "1")
+    said = json.loads(foreshock("compare", str(smoke), str(other), "--json", code=2))
+    assert "no arm and scenario with runs in common" in said["errors"][0]["message"]
+
+
 def test_results_do_not_depend_on_the_number_of_workers(campaign_file: Path, tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
     for folder, workers in ((one, "1"), (two, "2")):

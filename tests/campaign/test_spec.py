@@ -16,8 +16,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+import foreshock
 from foreshock._strict import read_toml
 from foreshock.campaign import campaign_schema, load_campaign, parse_campaign, plan_of, shipped
+from foreshock.campaign.identity import changes
 from foreshock.campaign.plan import merged
 from foreshock.campaign.sampling import points_of, quantile
 from foreshock.campaign.spec import CampaignSpec, Factor
@@ -192,3 +194,19 @@ def test_a_grid_is_the_product_of_levels() -> None:
     assert sorted({p["y"] for p in points}) == pytest.approx(
         [NormalDist().inv_cdf(u) for u in (1 / 6, 0.5, 5 / 6)], abs=1e-12
     )
+
+
+def test_a_key_depends_on_what_is_in_the_files_that_a_configuration_names(tmp_path: Path) -> None:
+    shipped_set = Path(foreshock.__file__).parent / "data" / "parameters" / "table-3.toml"
+    file = tmp_path / "mine.toml"
+    file.write_text(shipped_set.read_text())
+    config = {"risk": {"model": "correlated", "parameters": str(file)}}
+    spec = parse_campaign({**LEAST, "arms": [{"id": "on", "kind": "on", "config": config}]}, "c")
+    before, same = (plan_of(spec, Path(), Registry()) for _ in range(2))
+    assert [c.key for c in before.cases] == [c.key for c in same.cases]
+    file.write_text(file.read_text() + "# another\n")
+    after = plan_of(spec, Path(), Registry())
+    assert {c.key for c in after.cases}.isdisjoint(c.key for c in before.cases)
+    (said,) = changes(before.identity, after.identity)
+    assert said.startswith("files.a1-fall-onto-human, on.")
+    assert str(file) in said

@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+import foreshock
 from foreshock.errors import BadInputError, ConfigError
 from foreshock.session.isolated import Failure, Job, run_all
 from foreshock.session.run import Run
@@ -162,3 +163,19 @@ def test_a_twin_whose_step_does_not_divide_the_tick_is_refused(scenario: Scenari
                 )
             ]
         )
+
+
+def test_a_configuration_means_the_files_beside_its_scenario(tmp_path: Path) -> None:
+    """Two folders with the same scenario and other parameters: one worker does not take one for the other."""
+    shipped = (Path(foreshock.__file__).parent / "data" / "parameters" / "table-3.toml").read_text()
+    jobs = []
+    for name, text in (("good", shipped), ("bad", "[")):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "mine.toml").write_text(text)
+        risk = '[config.risk]\nmodel = "correlated"\nparameters = "mine.toml"\n'
+        (folder / "rogue.toml").write_text(SCENARIO + risk)
+        jobs.append(Job(load_scenario(folder / "rogue.toml"), "shadow", 1))
+    assert isinstance(run_all(jobs[:1])[0], Run)
+    with pytest.raises(BadInputError, match=r"bad/mine\.toml"):
+        run_all(jobs)

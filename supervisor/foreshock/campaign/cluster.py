@@ -10,13 +10,14 @@ import multiprocessing
 import shutil
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from foreshock.campaign.engine import Runner
 from foreshock.campaign.identity import changes, twin_files, versions
-from foreshock.campaign.plan import Plan
+from foreshock.campaign.plan import Plan, files_of
+from foreshock.campaign.spec import CampaignSpec
 from foreshock.errors import BadInputError, MissingExtraError
 from foreshock.registry import Registry
 from foreshock.session.isolated import Failure, Job, Source, Workers
@@ -61,19 +62,20 @@ def dask_runner(address: str, plan: Plan) -> Runner:
 
 def _check(client: Any, plan: Plan) -> None:
     """Refuse a cluster without workers, and a worker that would run something else."""
-    found = client.run(_identity, tuple(plan.scenarios.values()), tuple(plan.identity["plugins"]))
+    found = client.run(_identity, plan.spec, plan.scenarios, tuple(plan.identity["plugins"]))
     if not found:
         raise BadInputError("--dask", "the cluster has no worker")
-    here = {k: plan.identity[k] for k in ("code", "twins")}
+    here = {k: plan.identity[k] for k in ("code", "twins", "files")}
     for worker, there in sorted(found.items()):
         if differs := changes(here, there):
             raise BadInputError(f"--dask: worker {worker}", "runs something else:\n  " + "\n  ".join(differs))
 
 
-def _identity(scenarios: Sequence[Scenario], plugins: Sequence[str]) -> dict[str, Any]:
+def _identity(spec: CampaignSpec, scenarios: Mapping[str, Scenario], plugins: Sequence[str]) -> dict[str, Any]:
     """On a worker: what its results would depend on."""
     registry = Registry()
-    return {"code": versions(plugins), "twins": {s.id: twin_files(s, registry) for s in scenarios}}
+    twins = {id_: twin_files(s, registry) for id_, s in scenarios.items()}
+    return {"code": versions(plugins), "twins": twins, "files": files_of(spec, scenarios)}
 
 
 def _run(distributed: Any, client: Any, source: Source[str], timeout_s: float | None) -> None:

@@ -18,6 +18,9 @@ __all__ = ["LEVEL", "Change", "compare"]
 LEVEL = 0.05
 """Chance that any result is called worse where nothing has changed."""
 
+WITHOUT = Scope("fault", "no fault")
+"""The same runs as those of the whole."""
+
 Seat = tuple[str, str, int, int, str]
 
 
@@ -25,7 +28,7 @@ class Change(msgspec.Struct, frozen=True):
     """How one metric of one arm changed in one part.
 
     Attributes:
-        scope: overall, or a mode.
+        scope: overall, a mode or a fault.
         arm: id.
         metric: ``accidents``, ``false-interventions``, ``lead-time``, ``reduced-speed`` or ``failures``.
         before: value in the first campaign: a rate, or a median in s or as a share of time; NaN if there is none.
@@ -51,7 +54,7 @@ class Change(msgspec.Struct, frozen=True):
 
 
 def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]]) -> list[Change]:
-    """Every metric of the arms that both campaigns have, overall and per mode.
+    """Every metric of the arms and scenarios that both campaigns have, overall, per mode and per fault.
 
     Runs of the same scenario, parameters, fault, seed and arm are compared one by one (McNemar; Wilcoxon's signed ranks
     for times); where the campaigns share none, as independent samples (Fisher's exact test; Mann and Whitney's).
@@ -63,10 +66,14 @@ def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]
     arms = {a.id: a for a in before[0].spec.arms}
     shared = [a for a in after[0].spec.arms if a.id in arms]
     sides = [Outcomes(*before), Outcomes(*after)]
-    tables = [before[1], after[1]]
+    both = {r.scenario for r in before[1]} & {r.scenario for r in after[1]}
+    tables = [[r for r in rows if r.scenario in both] for _, rows in (before, after)]
     found: list[Change] = []
-    scopes = [s for s in scopes_of([*before[1], *after[1]]) if s[0].kind in ("overall", "mode")]
-    for scope, belongs in scopes[1:] if len(scopes) == 2 else scopes:  # one mode is the whole
+    scopes = [
+        s for s in scopes_of([*tables[0], *tables[1]]) if s[0].kind in ("overall", "mode", "fault") and s[0] != WITHOUT
+    ]
+    several = sum(scope.kind == "mode" for scope, _ in scopes) > 1
+    for scope, belongs in scopes if several else scopes[1:]:  # one mode is the whole
         for arm in shared:
             first, second = ({_seat(r): r for r in rows if r.arm == arm.id and belongs(r)} for rows in tables)
             if first and second:

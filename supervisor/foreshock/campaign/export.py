@@ -54,9 +54,11 @@ def flat_result(result: ArmResult) -> dict[str, Any]:
     if result.difference is not None:
         flat |= {f"difference.{k}": v for k, v in msgspec.to_builtins(result.difference).items()}
     if (lead := result.lead_quartiles_s) is not None:
+        flat |= {"lead_s.n": len(result.lead_s)}
         flat |= dict(zip(("lead_s.q1", "lead_s.median", "lead_s.q3"), lead, strict=True))
     if result.false is not None:
         flat |= {f"false.{k}": getattr(result.false, k) for k in ("k", "hours", "per_hour", "low", "high")}
+        flat |= _flat_rate("false_runs", result.disturbed)
     if result.safe is not None and (quartiles := result.safe.quartiles_s) is not None:
         flat |= dict(zip(("safe_s.q1", "safe_s.median", "safe_s.q3"), quartiles, strict=True))
         flat |= {"safe_s.n": len(result.safe.values_s), "safe_s.reached": result.safe.reached}

@@ -70,7 +70,7 @@ def lead_figure(
     found = []
     for r in rows:
         lead_s = outcomes.lead_s(r)
-        if lead_s is None or r.arm not in lines:
+        if lead_s is None or r.arm not in lines or r.fault:
             continue
         jitter = (int(r.key[:4], 16) / 65535.0 - 0.5) * 0.5  # a run lies where it lay
         text = f"{r.scenario}, {r.arm}, seed {r.seed}: {lead_s:.2f} s"

@@ -19,11 +19,13 @@ from foreshock.errors import MissingExtraError
 from foreshock.session.rates import Rate, wilson
 
 __all__ = [
+    "BINS",
     "AucDifference",
     "Bin",
     "Brier",
     "Discrimination",
     "auc_difference",
+    "bin_of",
     "brier",
     "discrimination",
     "precision_recall",
@@ -105,12 +107,17 @@ def reliability(p: Sequence[float], happened: Sequence[bool]) -> tuple[Bin, ...]
     """Ten bins of P of equal width, those without runs left out; the rates have Wilson intervals."""
     found = []
     for k in range(BINS):
-        inside = [(x, y) for x, y in zip(p, happened, strict=True) if min(int(x * BINS), BINS - 1) == k]
+        inside = [(x, y) for x, y in zip(p, happened, strict=True) if bin_of(x) == k]
         if inside:
             n = len(inside)
             mean = sum(x for x, _ in inside) / n
             found.append(Bin(k / BINS, (k + 1) / BINS, mean, wilson(sum(y for _, y in inside), n)))
     return tuple(found)
+
+
+def bin_of(p: float) -> int:
+    """Number of the bin that P lies in, from 0; 1 belongs to the last."""
+    return min(int(p * BINS), BINS - 1)
 
 
 def _metrics() -> Any:
@@ -187,8 +194,14 @@ def _split(p: Sequence[float], happened: Sequence[bool]) -> tuple[Floats, Floats
 
 def _placements(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Of each x the share of y below it, of each y the share of x above it; ties count half."""
-    order = (np.sign(x[:, None] - y[None, :]) + 1.0) / 2.0
-    return order.mean(axis=1), order.mean(axis=0)
+    return _share_below(x, y), 1.0 - _share_below(y, x)
+
+
+def _share_below(x: Floats, y: Floats) -> Floats:
+    """Of each x the share of y below it by rank, since a table of all pairs would not fit for 10^5 runs."""
+    ranked = np.sort(y)
+    found = (np.searchsorted(ranked, x, "left") + np.searchsorted(ranked, x, "right")) / (2.0 * len(y))
+    return np.asarray(found, dtype=np.float64)
 
 
 def _variance(placements: Floats) -> float:

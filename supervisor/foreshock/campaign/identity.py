@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata as md
 import importlib.util
+import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
@@ -18,7 +19,7 @@ from foreshock.registry import Registry
 from foreshock.session.isolated import placed
 from foreshock.session.scenario import Scenario
 
-__all__ = ["changes", "digest", "twin_files", "versions"]
+__all__ = ["changes", "digest", "named_files", "twin_files", "versions"]
 
 ASIDE = frozenset({"calibration", "campaign", "cli", "events", "live", "report", "sensitivity"})
 """Parts of the core that no stepped run passes through."""
@@ -53,6 +54,22 @@ def twin_files(scenario: Scenario, registry: Registry) -> dict[str, str]:
         return {}
     table = placed({k: v for k, v in scenario.twin.items() if k != "kind"}, Path(scenario.folder))
     return {role: _of_file(path) for role, path in sorted(spec.files(convert(table, spec.config, place)).items())}
+
+
+def named_files(config: Any, folder: Path) -> dict[str, str]:
+    """Hashes of the files that a configuration names, such as parameters of the risk model or a URDF, by what it says.
+
+    Args:
+        config: tables, arrays and values.
+        folder: that relative paths start from.
+    """
+    if isinstance(config, Mapping):
+        config = tuple(config.values())
+    if isinstance(config, (list, tuple)):
+        return {name: found for part in config for name, found in named_files(part, folder).items()}
+    if not isinstance(config, str) or not re.fullmatch(r"[^\0\n]{1,240}\.\w{1,8}", config):
+        return {}
+    return {config: _of_file(folder / config)} if (folder / config).is_file() else {}
 
 
 def versions(plugins: Iterable[str]) -> dict[str, str]:

@@ -23,13 +23,12 @@ from foreshock.errors import BadInputError, ConfigError
 from foreshock.records import Intervention
 from foreshock.session.isolated import Failure
 from foreshock.session.run import Run
+from foreshock.session.scripted import acts_of
 
 __all__ = ["LEDGER", "Ledger", "Row", "locked"]
 
 T = TypeVar("T")
 LEDGER = "ledger.sqlite"
-CHEAP = frozenset({"speed-scale", "announce"})
-"""Actions that cost little and are no intervention in the sense of an arm that acts by action."""
 
 
 class Row(msgspec.Struct, frozen=True):
@@ -57,7 +56,8 @@ class Row(msgspec.Struct, frozen=True):
         level: highest protection level of the mode, or minimal risk.
         caution_s: when the caution level was first reached.
         protective_s: when the protective level was.
-        acted_s: when an action of the mode, other than slowing down and announcing, first began.
+        acted_s: when an action of the mode, other than slowing down and announcing, first began, or the minimal risk
+            condition.
         peak_p: highest P of the mode before the accident.
         first_s: first time of each precursor kind of the mode.
         policy: what acted, or would have.
@@ -109,7 +109,7 @@ def row_of(case: Case, result: Run | Failure, wall_s: float, scripted: tuple[Int
     if isinstance(result, Failure):
         return Row(*at, status=result.kind, detail=result.detail, log=result.log)
     changes = result.interventions or scripted
-    acts = [i.stamp_ns for i in changes if i.strength > 0.0 and i.mode == case.mode and i.action not in CHEAP]
+    acts = [i.stamp_ns for i in acts_of(changes, case.mode)]
     return Row(
         *at,
         accident=result.accident,

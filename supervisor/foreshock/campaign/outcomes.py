@@ -67,11 +67,12 @@ class Outcomes:
     def false(self, row: Row) -> bool | None:
         """Whether it is a false intervention; None where the reference came to harm, or nobody knows.
 
-        None of an arm whose interventions are those of another: it does nothing where that one did nothing.
+        An arm whose interventions are those of another may have had none to take: that says nothing of it.
         """
-        if self._arms[row.arm].scripted or not self.calm(row):
+        at_s = self.acted_s(row)
+        if not self.calm(row) or (self._arms[row.arm].scripted and at_s is None):
             return None
-        return self.acted_s(row) is not None
+        return at_s is not None and at_s <= (row.end_s or 0.0)
 
     def lead_s(self, row: Row) -> float | None:
         """Time from the intervention to the reference's accident; negative is too late."""
@@ -89,10 +90,13 @@ class Outcomes:
         return float("inf") if row.safe_s is None else max(row.safe_s - at_s, 0.0)
 
     def reduced(self, row: Row) -> float | None:
-        """Share of a calm run's time under an action, of arms that decide and act.
+        """Share of a calm run's time under an action, of arms that act.
 
-        None where the reference came to harm, or it was not recorded.
+        None where the reference came to harm, it was not recorded, or there was nothing to take from another arm.
         """
-        if self._arms[row.arm].kind != "on" or row.reduced_s is None or not row.end_s or not self.calm(row):
+        arm = self._arms[row.arm]
+        if not arm.acts or row.reduced_s is None or not row.end_s or not self.calm(row):
+            return None
+        if arm.scripted and row.acted_s is None:
             return None
         return row.reduced_s / row.end_s

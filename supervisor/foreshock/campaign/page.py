@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from foreshock.campaign.engine import Campaign
+from foreshock.campaign.fault_effects import fault_effects
 from foreshock.campaign.figures import groups_of, lead_figure, maps_of, rate_figure
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.outcomes import Outcomes
@@ -76,7 +77,8 @@ def write_page(
             identity=plan.identity,
             whole=[r for r in main if r.scope == main[0].scope],
             rest=[r for r in main if r.scope != main[0].scope],
-            deciding={a.id for a in spec.arms if a.kind == "on"},
+            acting={a.id for a in spec.arms if a.acts},
+            faults=fault_effects(plan, rows),
             parts=[r for r in results if r.scope.kind in ("scenario", "factor")],
             partial=_partial(results),
             rates=rate_figure(main, colours, rows),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import msgspec
 
-from foreshock.campaign.forecast import precision_recall, roc
+from foreshock.campaign.forecast import BINS, bin_of, precision_recall, roc
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.plan import Plan
@@ -100,7 +100,7 @@ def pareto_panel(
     colours: Mapping[str, str],
     size: tuple[float, float],
 ) -> Panel | None:
-    """Accident rate against false interventions per hour, of the arms that decide and act, and of none.
+    """Accident rate against false interventions per hour, of the arms that act, and of none.
 
     Arms that ran in only some of the part's scenarios are left out; arms at one place are drawn side by side.
 
@@ -119,10 +119,10 @@ def pareto_panel(
         for r in results
         if r.accidents.n
         and r.scenarios == most
-        and (kinds[r.arm] == "none" or (kinds[r.arm] == "on" and r.false is not None and r.false.hours > 0.0))
+        and (kinds[r.arm] == "none" or (kinds[r.arm] != "shadow" and r.false is not None and r.false.hours > 0.0))
     ]
-    if not known:
-        return None
+    if not any(kinds[r.arm] != "none" for r in known):
+        return None  # nothing to hold against it
     outcomes = Outcomes(plan, rows)
     at = {r.arm: (r.false.per_hour if r.false is not None else 0.0, r.accidents.k / r.accidents.n) for r in known}
     front = front_of(at)
@@ -214,8 +214,8 @@ def _reliability(
         for b in result.reliability:
             x, y = frame.x(b.mean), frame.y(b.rate.k / b.rate.n)
             shift = 3.0 * (k - (len(arms) - 1) / 2.0)  # two models' bars beside each other
-            inside = (r for r in told[result.arm] if b.low <= (r.peak_p or 0.0) < b.high or b.high == 1.0)
-            key = next(r.key for r in sorted(inside, key=lambda r: abs((r.peak_p or 0.0) - b.mean)))
+            inside = [r for r in told[result.arm] if bin_of(r.peak_p or 0.0) == round(b.low * BINS)]
+            key = min((abs((r.peak_p or 0.0) - b.mean), r.key) for r in inside)[1]
             bar = (x + shift, frame.y(b.rate.low), x + shift, frame.y(b.rate.high))
             text = f"{result.arm}: P in {b.low:.1f}–{b.high:.1f}, mean {b.mean:.3f}: accidents {b.rate}"
             label = (str(b.rate.n), 12.0 * k)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from foreshock._strict import convert
-from foreshock.campaign.identity import digest, twin_files, versions
+from foreshock.campaign.identity import digest, named_files, twin_files, versions
 from foreshock.campaign.sampling import points_of
 from foreshock.campaign.spec import ArmEntry, CampaignSpec, FaultEntry, ScenarioEntry
 from foreshock.errors import ConfigError, nearest
@@ -20,9 +20,9 @@ from foreshock.registry import Registry
 from foreshock.session.isolated import Job
 from foreshock.session.run import Arm
 from foreshock.session.scenario import VARIANT, Scenario, find_scenario, load_scenario, scenario_ids
-from foreshock.session.scripted import held, moved
+from foreshock.session.scripted import acts_of, held, moved, protective
 
-__all__ = ["Case", "Plan", "plan_of", "under"]
+__all__ = ["Case", "Plan", "files_of", "plan_of", "under"]
 
 SUPERVISOR: Mapping[str, Arm] = {"none": "off", "shadow": "shadow", "on": "on", "random": "off", "always": "off"}
 
@@ -61,14 +61,18 @@ class Plan(msgspec.Struct, frozen=True):
     Attributes:
         spec: the campaign.
         scenarios: by id, with the campaign's changes but no arm's.
-        identity: what results depend on: campaign, scenarios, and hashes of the twins' files and of the code.
+        identity: what results depend on: campaign, scenarios, and hashes of the twins' files, of files that
+            configurations name, and of the code.
         cases: the runs.
+        protective: by scenario and arm, for arms whose interventions others take, what their policies do at the mode's
+            protective gate.
     """
 
     spec: CampaignSpec
     scenarios: dict[str, Scenario]
     identity: dict[str, Any]
     cases: tuple[Case, ...]
+    protective: dict[tuple[str, str], tuple[Intervention, ...]] = {}
 
     def scenario(self, case: Case) -> Scenario:
         """The scenario of a run, under its arm, with its values and faults."""
@@ -76,9 +80,14 @@ class Plan(msgspec.Struct, frozen=True):
         return _with_faults(scenario, next((f for f in self.spec.faults if f.id == case.fault), None))
 
     def job(self, case: Case, changes: tuple[Intervention, ...] = ()) -> Job:
-        """The run, given the interventions of the run that it takes them from."""
+        """The run, given the interventions of the run that it takes them from.
+
+        Where that one did not act, it takes what that one's policies do at the protective gate.
+        """
         arm = self.spec.arm(case.arm)
         scenario = self.scenario(case)
+        if arm.scripted and not acts_of(changes, case.mode):
+            changes = self.protective[case.scenario, self.spec.source(arm).id]
         scripted: tuple[Intervention, ...] = ()
         if arm.kind == "random":
             scripted = moved(changes, scenario.duration_s, case.seed)
@@ -141,20 +150,44 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
     plugins = _check_arms(spec, scenarios, registry)
     code = versions(plugins)
     files = {id_: twin_files(s, registry) for id_, s in scenarios.items()}
+    named = files_of(spec, scenarios)
+    acts = {
+        (s.id, source.id): protective(under(s, source).supervisor(), s.mode, registry)
+        for source in {a.id: spec.source(a) for a in spec.arms if a.scripted}.values()
+        for s in scenarios.values()
+        if _matches(s.id, source.scenarios)
+    }
     cases: list[Case] = []
     for scenario, replicates in entries:
-        cases += _cases(spec, scenario, replicates, {"files": files[scenario.id], "code": code})
+        cases += _cases(spec, scenario, replicates, {"files": files[scenario.id], "code": code}, named, acts)
     if spec.budget.runs is not None and len(cases) > spec.budget.runs:
         raise ConfigError("budget.runs", f"{spec.budget.runs} runs, but the campaign has {len(cases)}")
     identity = {
         "campaign": {k: v for k, v in msgspec.to_builtins(spec).items() if k not in ("title", "metrics", "budget")},
         "scenarios": {id_: _content(s) for id_, s in scenarios.items()},
         "twins": files,
+        "files": named,
         "code": code,
         "plugins": sorted(plugins),
     }
     # as it will be read from the ledger: lists, not tuples
-    return Plan(spec, scenarios, msgspec.json.decode(msgspec.json.encode(identity)), tuple(cases))
+    return Plan(spec, scenarios, msgspec.json.decode(msgspec.json.encode(identity)), tuple(cases), acts)
+
+
+def files_of(spec: CampaignSpec, scenarios: Mapping[str, Scenario]) -> dict[str, dict[str, str]]:
+    """Hashes of the files that the configurations of a campaign name, by scenario and arm; those without are left out.
+
+    Args:
+        spec: the campaign.
+        scenarios: of it, by id.
+    """
+    found = {
+        f"{s.id}, {arm.id}": named_files(under(s, arm).config, Path(s.folder))
+        for s in scenarios.values()
+        for arm in spec.arms
+        if arm.judged and _matches(s.id, arm.scenarios)
+    }
+    return {place: files for place, files in found.items() if files}
 
 
 def _content(scenario: Scenario) -> dict[str, Any]:
@@ -214,7 +247,14 @@ def _check_arms(spec: CampaignSpec, scenarios: Mapping[str, Scenario], registry:
     return plugins
 
 
-def _cases(spec: CampaignSpec, scenario: Scenario, replicates: int, identity: dict[str, Any]) -> list[Case]:
+def _cases(
+    spec: CampaignSpec,
+    scenario: Scenario,
+    replicates: int,
+    identity: dict[str, Any],
+    named: Mapping[str, Mapping[str, str]],
+    acts: Mapping[tuple[str, str], Sequence[Intervention]],
+) -> list[Case]:
     factors = [f for f in spec.factors if _matches(scenario.id, f.scenarios)]
     faults = [None, *(f for f in spec.faults if _matches(scenario.id, f.scenarios))]
     arms = sorted((a for a in spec.arms if _matches(scenario.id, a.scenarios)), key=lambda a: a.scripted)
@@ -235,6 +275,10 @@ def _cases(spec: CampaignSpec, scenario: Scenario, replicates: int, identity: di
                     "seed": seed,
                     "source": source,
                 }
+                if found := named.get(f"{scenario.id}, {arm.id}"):
+                    parts["named"] = found
+                if arm.scripted:
+                    parts["acts"] = [(i.action, i.strength) for i in acts[scenario.id, spec.source(arm).id]]
                 if not arm.judged:
                     parts["scenario"]["config"] = {"supervisor": scenario.config.get("supervisor")}
                 fault_id = fault.id if fault is not None else ""

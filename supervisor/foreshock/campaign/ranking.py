@@ -68,9 +68,9 @@ class Standing(msgspec.Struct, frozen=True):
 def duels_of(plan: Plan, rows: Sequence[Row]) -> list[Duel]:
     """All duels, overall and per mode.
 
-    Accidents are compared in scenarios in which they can be expected; with rivals that decide themselves also false
-    interventions and the share of time at reduced speed, in runs whose reference run came to no harm, and lead times,
-    where both acted. Pairs of events are tested by McNemar, of numbers by Wilcoxon's signed ranks.
+    Accidents are compared in scenarios in which they can be expected; with rivals that act also false interventions and
+    the share of time at reduced speed, in runs whose reference run came to no harm; with those that decide themselves
+    lead times, where both acted. Pairs of events are tested by McNemar, of numbers by Wilcoxon's signed ranks.
 
     Args:
         plan: of the campaign.
@@ -103,12 +103,10 @@ def _duels(
         return None if value is None else float(value)
 
     contests: list[tuple[Contest, Callable[[Row], float | None]]] = [("accidents", accident)]
+    if rival.acts:
+        contests += [("false interventions", false), ("reduced speed", outcomes.reduced)]
     if rival.kind == "on":
-        contests += [
-            ("false interventions", false),
-            ("reduced speed", outcomes.reduced),
-            ("lead time", outcomes.lead_s),
-        ]
+        contests.append(("lead time", outcomes.lead_s))
     found = []
     for metric, of in contests:
         both = [(x, y) for a, b in pairs if (x := of(a)) is not None and (y := of(b)) is not None]

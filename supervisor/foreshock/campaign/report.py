@@ -1,4 +1,4 @@
-"""Writes what a campaign found into its folder: Parquet files and one HTML page; and its ranking as Markdown."""
+"""Writes what a campaign found into its folder: Parquet files and one HTML page; and its tables as Markdown."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import msgspec
 
 from foreshock.campaign.engine import Campaign
 from foreshock.campaign.export import flat_duel, flat_forecasts, flat_result, flat_row, flat_trace, write_parquet
+from foreshock.campaign.fault_effects import fault_effects
 from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.page import write_page
 from foreshock.campaign.ranking import duels_of, standings_of
 from foreshock.campaign.results import ArmResult, results_of
 from foreshock.campaign.trace import traces_of
-from foreshock.campaign.verdicts import bouts, markdown
+from foreshock.campaign.verdicts import bouts, fault_table, markdown
 
 __all__ = ["ranking_of", "write_results"]
 
@@ -49,7 +50,7 @@ def write_results(campaign: Campaign) -> tuple[list[ArmResult], list[Path]]:
 
 
 def ranking_of(campaign: Campaign, results: Sequence[ArmResult]) -> str:
-    """Which arm wins where, and where Foreshock loses, as Markdown.
+    """Which arm wins where, where Foreshock loses, and what each fault does, as Markdown.
 
     Args:
         campaign: that it is of.
@@ -57,4 +58,5 @@ def ranking_of(campaign: Campaign, results: Sequence[ArmResult]) -> str:
     """
     plan, rows = campaign.plan, campaign.rows()
     total = sum(r.ok for r in rows), len(plan.cases)
-    return markdown(plan, total, standings_of(plan, results), bouts(duels_of(plan, rows), results))
+    told = markdown(plan, total, standings_of(plan, results), bouts(duels_of(plan, rows), results))
+    return told + fault_table(fault_effects(plan, rows))

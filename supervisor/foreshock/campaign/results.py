@@ -1,4 +1,8 @@
-"""What a campaign found: per arm, overall, per mode, scenario, fault and factor value, with 95% intervals."""
+"""What a campaign found: per arm, overall, per mode, scenario, fault and factor value, with 95% intervals.
+
+Runs with a fault count in the part of that fault alone: they share their seeds with those without, and a run that is
+counted again under each of a dozen faults would feign a dozen runs.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +29,7 @@ SEVERAL = 12
 
 
 class Scope(msgspec.Struct, frozen=True):
-    """A part of the campaign's runs; its name is empty for all of them."""
+    """A part of the campaign's runs: without faults, but for those of one fault. Its name is empty for the whole."""
 
     kind: ScopeKind
     name: str = ""
@@ -47,8 +51,8 @@ class ArmResult(msgspec.Struct, frozen=True):
         caused: accidents that happened here and not under the reference.
         lead_s: from the intervention to the accident under the reference, one per run that has both, sorted; negative:
             too late.
-        false: interventions in runs whose reference run came to no harm, per hour of such runs; of arms that decide
-            themselves: one that takes another's interventions does nothing where that one did nothing.
+        false: interventions in runs whose reference run came to no harm, per hour of such runs.
+        disturbed: share of those runs that intervened.
         safe: time from the intervention to the safe state, of runs of a judged arm without the accident; None if nobody
             judged, or it was not recorded.
         reduced: share of the time of runs whose reference run came to no harm in which an action held; None if there
@@ -70,6 +74,7 @@ class ArmResult(msgspec.Struct, frozen=True):
     caused: int
     lead_s: tuple[float, ...]
     false: Frequency | None
+    disturbed: Rate
     safe: Times | None
     reduced: TimeShare | None
     brier: Brier | None
@@ -90,11 +95,11 @@ class ArmResult(msgspec.Struct, frozen=True):
 
 def scopes_of(rows: Sequence[Row]) -> list[tuple[Scope, Callable[[Row], bool]]]:
     """Every part that is reported, and whether a run belongs to it."""
-    found: list[tuple[Scope, Callable[[Row], bool]]] = [(Scope("overall"), lambda _: True)]
+    found: list[tuple[Scope, Callable[[Row], bool]]] = [(Scope("overall"), lambda r: not r.fault)]
     modes = sorted({r.mode for r in rows}, key=lambda m: (len(m), m))
-    found += [(Scope("mode", m), lambda r, m=m: r.mode == m) for m in modes]  # type: ignore[misc]  # m is bound here
+    found += [(Scope("mode", m), lambda r, m=m: r.mode == m and not r.fault) for m in modes]  # type: ignore[misc]  # m is bound here
     scenarios = list(dict.fromkeys(r.scenario for r in rows))
-    found += [(Scope("scenario", s), lambda r, s=s: r.scenario == s) for s in scenarios]  # type: ignore[misc]  # as above
+    found += [(Scope("scenario", s), lambda r, s=s: r.scenario == s and not r.fault) for s in scenarios]  # type: ignore[misc]  # as above
     faults = list(dict.fromkeys(r.fault for r in rows))
     if faults != [""]:
         found += [(Scope("fault", f or "no fault"), lambda r, f=f: r.fault == f) for f in faults]  # type: ignore[misc]  # as above
@@ -102,7 +107,7 @@ def scopes_of(rows: Sequence[Row]) -> list[tuple[Scope, Callable[[Row], bool]]]:
         values = sorted({r.parameters[name] for r in rows if name in r.parameters})
         if len(values) <= SEVERAL:
             found += [
-                (Scope("factor", f"{name} = {v:g}"), lambda r, n=name, v=v: r.parameters.get(n) == v)  # type: ignore[misc]  # as above
+                (Scope("factor", f"{name} = {v:g}"), lambda r, n=name, v=v: r.parameters.get(n) == v and not r.fault)  # type: ignore[misc]  # as above
                 for v in values
             ]
     return found
@@ -144,7 +149,8 @@ def _judged(
     both = [(a, b) for a, b in pairs if b.scenario in exposed]
     hurt = [(a, b) for a, b in both if a.accident]
     calm = [r for r in runs if outcomes.calm(r)]
-    false = per_hour(sum(bool(outcomes.false(r)) for r in calm), sum(r.end_s or 0.0 for r in calm) / 3600.0)
+    judged = [(r, wrong) for r in calm if (wrong := outcomes.false(r)) is not None]
+    errors, hours = sum(wrong for _, wrong in judged), sum(r.end_s or 0.0 for r, _ in judged) / 3600.0
     slowed = [r for r in calm if outcomes.reduced(r) is not None]
     safe = [t for r in runs if (t := outcomes.safe_after_s(r)) is not None]
     itself = reference is None or arm.id == reference.id
@@ -161,7 +167,8 @@ def _judged(
         wilson(sum(not b.accident for _, b in hurt), len(hurt)),
         sum(bool(b.accident) and not a.accident for a, b in pairs),
         tuple(sorted(t for _, r in hurt if (t := outcomes.lead_s(r)) is not None)),
-        false if reference is not None and arm.judged else None,
+        per_hour(errors, hours) if reference is not None and (arm.judged or judged) and arm.kind != "none" else None,
+        wilson(errors, len(judged)),
         Times(tuple(sorted(safe))) if safe else None,
         share_of_time([r.reduced_s or 0.0 for r in slowed], [r.end_s or 0.0 for r in slowed]) if slowed else None,
         brier(p, happened),

@@ -112,7 +112,8 @@ class ArmEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         id: kebab-case.
         kind: ``none`` (no supervisor), ``shadow`` (judges, does not act), ``on``, or the interventions of another arm's
-            run of the same seed without a supervisor: all moved to a ``random`` time, or ``always`` held.
+            run of the same seed without a supervisor: all moved to a ``random`` time, or ``always`` held; where that
+            run did not act, what its policies do at the mode's protective gate.
         title: for people.
         policy: replaces the scenario's policies.
         config: tables that are merged into the scenario's configuration, key by key; lists replace lists. The text
@@ -141,6 +142,11 @@ class ArmEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def judged(self) -> bool:
         """Whether a supervisor runs."""
         return self.kind in ("shadow", "on")
+
+    @property
+    def acts(self) -> bool:
+        """Whether anything is done to the plant."""
+        return self.kind == "on" or self.scripted
 
     @property
     def foreshock(self) -> bool:

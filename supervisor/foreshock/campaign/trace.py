@@ -30,7 +30,7 @@ Verdict: TypeAlias = Literal[
 
 
 class Trace(msgspec.Struct, frozen=True):
-    """One line of the traceability table.
+    """One line of the traceability table, of runs without faults.
 
     Attributes:
         hazard: of the mode, with the clauses of the standards.
@@ -77,10 +77,10 @@ def traces_of(plan: Plan, rows: Sequence[Row], results: Sequence[ArmResult]) -> 
     outcomes = Outcomes(plan, rows)
     of_scenario = {(r.scope.name, r.arm): r for r in results if r.scope.kind == "scenario"}
     planned: dict[tuple[str, str], int] = {}
-    for case in plan.cases:
+    for case in (c for c in plan.cases if not c.fault):
         planned[case.scenario, case.arm] = planned.get((case.scenario, case.arm), 0) + 1
     mine: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
+    for row in (r for r in rows if not r.fault):
         mine.setdefault((row.scenario, row.arm), []).append(row)
     found = []
     for mode in builtin_taxonomy().modes:

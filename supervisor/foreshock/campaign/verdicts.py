@@ -1,4 +1,4 @@
-"""The ranking of arms in words: for the page, and as Markdown for the docs."""
+"""The ranking of arms, and what faults do, in words: for the page, and as Markdown for the docs."""
 
 from __future__ import annotations
 
@@ -8,14 +8,21 @@ from typing import TypeVar
 
 import msgspec
 
+from foreshock.campaign.fault_effects import FaultEffect
 from foreshock.campaign.plan import Plan
 from foreshock.campaign.ranking import Duel, Standing
 from foreshock.campaign.results import ArmResult, Scope, frequency
 
-__all__ = ["Bout", "bouts", "duration", "markdown", "worth_telling"]
+__all__ = ["Bout", "bouts", "duration", "fault_table", "markdown", "worth_telling"]
 
 
 Part = TypeVar("Part", Standing, "Bout")
+# fmt: off
+FAULT_COLUMNS = (
+    "fault", "arm", "accidents", "without it", "in", "false interventions", "without it", "minimal risk", "no result",
+    "shown",
+)
+# fmt: on
 
 
 class Bout(msgspec.Struct, frozen=True):
@@ -71,8 +78,8 @@ def markdown(plan: Plan, total: tuple[int, int], standings: Sequence[Standing], 
         f"Campaign `{spec.id}`, seeds from {spec.seed}: {total[0]} of {total[1]} runs gave a result. Reference: "
         f"{f'`{reference.id}`' if reference else 'no arm'}. Brackets are 95% intervals.",
         "",
-        "First places by the figures alone, of arms that ran in all scenarios of the part; the last two columns are of "
-        "arms that decide and act.",
+        "First places by the figures alone, of arms that ran in all scenarios of the part"
+        f"{', without faults' if spec.faults else ''}; the last two columns are of arms that decide and act.",
         "",
         "| part | fewest accidents | fewest false interventions per hour | least time at reduced speed |",
         "|---|---|---|---|",
@@ -93,6 +100,29 @@ def markdown(plan: Plan, total: tuple[int, int], standings: Sequence[Standing], 
         wins, loses = ("; ".join(x) or "nobody" for x in (b.wins, b.loses))
         cells = [f"`{r.arm}`", str(r.accidents), frequency(r.false), str(r.reduced or "–"), wins, loses]
         lines.append(f"| {b.scope.name or 'overall'} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def fault_table(effects: Sequence[FaultEffect]) -> str:
+    """What each fault does, as Markdown; empty of no faults."""
+    if not effects:
+        return ""
+    lines = [
+        "",
+        "Each fault against the same runs without it: what is significantly worse at 5% (exact McNemar test, corrected "
+        "by Holm for all faults). False interventions are runs that intervened although the reference's run came to no "
+        "harm; at minimal risk the supervisor noticed the fault and gave up. More accidents: the fault is neither "
+        "noticed nor endured. More false interventions alone: it fails closed, at the price of a stop.",
+        "",
+        f"| {' | '.join(FAULT_COLUMNS)} |",
+        "|---" * len(FAULT_COLUMNS) + "|",
+    ]
+    for e in effects:
+        where = "; ".join(f"`{scenario}` {rate.k}/{rate.n}" for scenario, rate in e.where.items()) or "–"
+        shown = ", ".join(f"**{x}**" if x == "more accidents" else x for x in e.effects)
+        cells = [e.fault, f"`{e.arm}`", str(e.accidents), f"{e.accidents_without.k}/{e.accidents_without.n}", where]
+        cells += [str(e.false), f"{e.false_without.k}/{e.false_without.n}", str(e.minimal_risk), str(e.failures), shown]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 

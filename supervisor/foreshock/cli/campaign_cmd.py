@@ -114,7 +114,7 @@ def status(folder: Path, as_json: bool) -> int:
     "--markdown",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Write which arm wins where, and where Foreshock loses, as Markdown.",
+    help="Write which arm wins where, where Foreshock loses, and what each fault does, as Markdown.",
 )
 @json_option
 def report(folder: Path, markdown: Path | None, as_json: bool) -> int:
@@ -144,17 +144,23 @@ def compare(first: Path, second: Path, as_json: bool) -> int:
     """Hold campaign B against campaign A, run by run where they share runs.
 
     Exit code 1 if a result of B is significantly worse: more accidents or false interventions, less lead time, more
-    time at reduced speed, more runs without a result.
+    time at reduced speed, more runs without a result; 2 if they have nothing in common.
     """
     registry = Registry()
     sides = [reopen(folder, registry)[0] for folder in (first, second)]
-    changes = compare_campaigns(*((c.plan, c.rows()) for c in sides))
+    rows = [c.rows() for c in sides]
+    for side, found in zip(sides, rows, strict=True):
+        if len(found) < len(side.plan.cases):
+            notes.print(f"{side.folder}: {len(found)} of {len(side.plan.cases)} runs are there", markup=False)
+    changes = compare_campaigns(*((c.plan, r) for c, r in zip(sides, rows, strict=True)))
+    if not changes:
+        raise BadInputError(str(second), f"has no arm and scenario with runs in common with {first}")
+    if missing := {a.id for a in sides[0].plan.spec.arms} - {c.arm for c in changes}:
+        notes.print(f"not compared, since only one of them has it: arm {', '.join(sorted(missing))}", markup=False)
     if as_json:
         emit([{**msgspec.to_builtins(c), "worse": c.worse} for c in changes])
-    elif changes:
-        print_changes(changes)
     else:
-        console.print("they have no arm in common")
+        print_changes(changes)
     return NEGATIVE if any(c.worse for c in changes) else OK
 
 

@@ -116,7 +116,8 @@ def _print(found: Found, search: Search) -> None:
     failed = ", ".join(f"{n} {kind}" for kind, n in sorted(found.failed.items())) or "none failed"
     least = "–" if found.robustness is None else f"{found.robustness:.3g}"
     lines = [
-        f"{found.scenario}: {found.runs} of {search.runs} runs, {found.known} runs known from before; {failed}",
+        f"{found.scenario}: {found.runs} runs, {found.known} of them known from before; the budget of the search is "
+        f"{search.runs}; {failed}",
         f"least robustness {least} of {found.formula}: {_values(found.best)}",
         f"{len(found.cases)} found; {found.candidates - len(found.cases)} more did not stand {FRESH} fresh seeds",
     ]

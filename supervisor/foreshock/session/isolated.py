@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures import TimeoutError as FutureTimeout
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -116,7 +116,7 @@ def _timed(job: Job, scratch: str) -> tuple[Run, float]:
     twin = _BENCH[twin_key] = _BENCH.pop(twin_key)
     judge: Supervisor | None = None
     if job.arm != "off":
-        key = msgspec.json.encode(("supervisor", job.scenario.config), order="sorted")
+        key = msgspec.json.encode(("supervisor", job.scenario.config, job.scenario.folder), order="sorted")
         if key not in _BENCH:
             _BENCH[key] = Supervisor(job.scenario.supervisor(), Path(job.scenario.folder), registry)
         gc.freeze()  # a full collection would walk through all that set-up made, in the middle of a tick
@@ -143,7 +143,7 @@ def _timed(job: Job, scratch: str) -> tuple[Run, float]:
             if isinstance(twin, Recorder) and job.poses:
                 twin.save(Path(job.poses))
             return run, wall_s
-    except TwinError:
+    except Exception:  # whatever ended this run, the next one must not begin with what it left behind
         _BENCH.pop(twin_key).close()
         raise
 
@@ -336,8 +336,15 @@ def _result(job: Job, future: Any, timeout_s: float, scratch: Path) -> Any:
 
 def _last_words(scratch: Path, most: int = 4000) -> str:
     """The end of the newest logs in scratch."""
-    logs = sorted(scratch.rglob("*.log"), key=lambda p: p.stat().st_mtime)
-    return "\n".join(text for p in logs[-3:] if (text := p.read_text(errors="replace")[-most:].strip()))
+    found: list[tuple[float, Path]] = []
+    for path in scratch.rglob("*.log"):
+        with suppress(FileNotFoundError):  # another worker has just closed its twin; below likewise
+            found.append((path.stat().st_mtime, path))
+    words = []
+    for _, path in sorted(found)[-3:]:
+        with suppress(FileNotFoundError):
+            words.append(path.read_text(errors="replace")[-most:].strip())
+    return "\n".join(filter(None, words))
 
 
 def run_one(job: Job, timeout_s: float | None = None) -> Run:
