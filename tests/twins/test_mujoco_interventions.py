@@ -26,7 +26,7 @@ def joint(twin: MujocoTwin, seen: Seen, name: str, at_s: float) -> float:
     return state.position[state.name.index(name)]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_suppressing_the_step_saves_the_robot_on_ice(twin: MujocoTwin, seed: int) -> None:
     assert run(twin, 7.0, seed=seed, **ICE).fell
     assert not run(twin, 7.0, ((4.4, "step-suppression", 1.0),), seed=seed, **ICE).fell
@@ -42,6 +42,13 @@ def test_what_helps_depends_on_the_disturbance(twin: MujocoTwin) -> None:
     lock = ((4.4, "balance-lock", 1.0),)
     assert not run(twin, 12.0, lock, step_length=0.2, blind_time=4.0, blind_duration=1e9).fell
     assert run(twin, 7.0, lock, **ICE).fell
+
+
+def test_on_slick_ice_stronger_feedback_undoes_what_a_suppressed_step_saves(twin: MujocoTwin) -> None:
+    slick = {**ICE, "drop_mu": 0.01}
+    step = (4.38, "step-suppression", 1.0)
+    assert not run(twin, 6.5, (step,), **slick).fell
+    assert run(twin, 6.5, (step, (4.38, "balance-lock", 1.0)), **slick).fell
 
 
 def test_a_suppressed_step_puts_the_foot_down_and_the_walk_goes_on_after_release(twin: MujocoTwin) -> None:
@@ -85,13 +92,15 @@ def test_stiffer_legs_and_stronger_feedback_hold_a_pushed_robot_closer(twin: Muj
     assert way[0] > way[1] > way[2]
 
 
-@pytest.mark.parametrize(("action", "share"), [("speed-scale", 0.5), ("shorten-step", 1.0)])
-def test_shorter_steps_make_a_slower_walk(twin: MujocoTwin, action: str, share: float) -> None:
-    full, short = (run(twin, 9.0, ((0.5, action, s),), step_length=0.2) for s in (0.0, share))
-    assert not full.events
-    assert not short.events
-    left = {"speed-scale": 0.5, "shorten-step": 0.4}[action]
-    assert short.truth[-1]["com_x"] == pytest.approx(left * full.truth[-1]["com_x"], rel=0.1)
+def test_shorter_steps_make_a_slower_walk(twin: MujocoTwin) -> None:
+    """speed-scale at strength s leaves 1 - s of the length, shorten-step at strength 1 leaves 0.4."""
+    way = []
+    for action, strength in (("announce", 1.0), ("speed-scale", 0.5), ("shorten-step", 1.0)):
+        seen = run(twin, 5.5, ((0.1, action, strength),), step_length=0.2, start_time=0.2)
+        assert not seen.events
+        way.append(seen.truth[-1]["com_x"])
+    assert way[1] == pytest.approx(0.5 * way[0], rel=0.1)
+    assert way[2] == pytest.approx(0.4 * way[0], rel=0.1)
 
 
 def test_a_protective_stop_on_one_leg_topples_and_a_suppressed_step_does_not(twin: MujocoTwin) -> None:

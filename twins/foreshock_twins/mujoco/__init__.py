@@ -5,8 +5,8 @@ soles, of the body with the floor, and of the body with a human of capsules.
 
 Channels, below the robot's name, with their periods: ``joints/state`` (position, velocity, effort), ``base/odometry``,
 ``imu/torso``, ``left_sole/wrench``, ``right_sole/wrench`` and ``plan/motion`` 5 ms; ``joints/plan`` and
-``left_arm/odometry`` (the hand), ``left_gripper/imu``, ``left_gripper/object``, ``left_gripper/object_command`` (what it
-holds, seen and planned) and those of the right 10 ms; ``left_foot/odometry``, ``left_foot/plan`` and those of
+``left_arm/odometry`` (the hand), ``left_gripper/imu``, ``left_gripper/object``, ``left_gripper/object_command`` (what
+it holds, seen and planned) and those of the right 10 ms; ``left_foot/odometry``, ``left_foot/plan`` and those of
 the right 20 ms; ``humans/pose`` and ``human-1/gaze`` 40 ms; ``plan/path`` 100 ms. A measurement is stamped when it was
 taken, and arrives ``latency`` later.
 
