@@ -1,0 +1,122 @@
+"""Tables of whole-body.md from its two campaigns: python docs/results/whole_body.py out/whole-body out/whole-body-subsets."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from foreshock.campaign.engine import Campaign, reopen
+from foreshock.campaign.ledger import Row
+from foreshock.campaign.results import ArmResult, results_of
+from foreshock.registry import Registry
+from foreshock.session.rates import wilson
+
+PROTOCOLS = {
+    "S": "step-suppression",
+    "A": "arm-reconfiguration",
+    "C": "compliance-tuning",
+    "B": "balance-lock",
+}
+Seat = tuple[str, int]
+
+
+def seat(row: Row) -> Seat:
+    """What the arms of both campaigns share."""
+    return row.scenario, row.seed
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table in Markdown."""
+    print("\n| " + " | ".join(head) + " |")
+    print("|" + "---|" * len(head))
+    for row in rows:
+        print("| " + " | ".join(row) + " |")
+
+
+def short(scenario: str) -> str:
+    """Without the twin."""
+    return scenario.partition("@")[0]
+
+
+def effect(results: Sequence[ArmResult]) -> None:
+    """Accidents by scenario and arm, paired with the runs in shadow."""
+    rows = []
+    for r in results:
+        if r.scope.kind not in ("overall", "scenario", "mode"):
+            continue
+        d, lead = r.difference, r.lead_quartiles_s
+        rows.append(
+            (
+                short(r.scope.name) or "all",
+                r.arm,
+                str(r.accidents),
+                f"{100 * d.difference:+.0f} ({100 * d.low:+.0f}..{100 * d.high:+.0f}), p {d.p:.2g}" if d else "–",
+                f"{r.prevented.k}/{r.prevented.n}" if d else "–",
+                str(r.caused) if d else "–",
+                " / ".join(f"{x:.2f}" for x in lead) if lead and d else "–",
+                "–" if r.false is None else f"{r.false.k} in {60.0 * r.false.hours:.1f} min",
+            )
+        )
+    head = ("part", "arm", "accidents", "paired difference (points)", "prevented", "caused", "lead, quartiles (s)")
+    table((*head, "false interventions"), rows)
+
+
+def by_subset(rows: Sequence[Row]) -> dict[str, dict[Seat, bool]]:
+    """Accidents by arm and seat."""
+    found: dict[str, dict[Seat, bool]] = {}
+    for row in rows:
+        if row.accident is not None:
+            found.setdefault(row.arm, {})[seat(row)] = row.accident
+    return found
+
+
+def subsets(rows: Sequence[Row], arms: Sequence[str]) -> None:
+    """Prevented of the unsupervised falls, and falls that only the arm has, by subset and scenario."""
+    found = by_subset(rows)
+    base = found["shadow"]
+    scenarios = list(dict.fromkeys(s for s, _ in base))
+
+    def cell(arm: str, scenario: str) -> str:
+        pairs = [(base[s], hurt) for s, hurt in found[arm].items() if s in base and scenario in ("", s[0])]
+        fell = [hurt for was, hurt in pairs if was]
+        caused = sum(hurt for was, hurt in pairs if not was)
+        return f"{len(fell) - sum(fell)}/{len(fell)}" + (f", {caused} caused" if caused else "")
+
+    body = [(arm, *(cell(arm, s) for s in scenarios), cell(arm, "")) for arm in arms if arm in found]
+    table(("actions", *(short(s).removeprefix("a1-fall-") for s in scenarios), "all"), body)
+
+
+def savable(rows: Sequence[Row], arms: Sequence[str], judged: Sequence[str]) -> None:
+    """Of the falls that some subset prevents, the share that each judged arm prevents."""
+    found = by_subset(rows)
+    fell = [s for s, hurt in found["shadow"].items() if hurt]
+    can = [s for s in fell if any(not found[a].get(s, True) for a in arms if a in found)]
+    print(f"\nOf {len(fell)} falls in shadow, some subset prevents {len(can)}.")
+    for arm in judged:
+        print(f"- {arm} prevents {wilson(sum(not found[arm][s] for s in can), len(can))} of these")
+
+
+def of(folder: str) -> tuple[Campaign, list[Row]]:
+    """A campaign and its rows."""
+    campaign, _ = reopen(Path(folder), Registry(), accept=True)
+    return campaign, campaign.rows()
+
+
+def main(main_folder: str, subset_folder: str) -> None:
+    """Print all tables."""
+    campaign, rows = of(main_folder)
+    print(
+        f"{len(rows)} runs, {sum(r.status != 'ok' for r in rows)} without a result, seeds from {campaign.plan.spec.seed}"
+    )
+    effect(results_of(campaign.plan, rows))
+    campaign, rows = of(subset_folder)
+    names = [a.id for a in campaign.plan.spec.arms if a.id not in ("shadow", "by-cause", "protocol")]
+    print(f"\n{len(rows)} runs, {sum(r.status != 'ok' for r in rows)} without a result")
+    print("\n" + ", ".join(f"{k.lower()} {v}" for k, v in PROTOCOLS.items()))
+    subsets(rows, [*names, "by-cause", "protocol"])
+    savable(rows, names, ("by-cause", "protocol"))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
