@@ -1,4 +1,7 @@
-"""Tables of whole-body.md from its two campaigns: python docs/results/whole_body.py out/whole-body out/whole-body-subsets."""
+"""Tables of whole-body.md from its campaigns.
+
+python docs/results/whole_body.py out/whole-body out/whole-body-subsets
+"""
 
 from __future__ import annotations
 
@@ -13,10 +16,10 @@ from foreshock.registry import Registry
 from foreshock.session.rates import wilson
 
 PROTOCOLS = {
-    "S": "step-suppression",
-    "A": "arm-reconfiguration",
-    "C": "compliance-tuning",
-    "B": "balance-lock",
+    "s": "step-suppression",
+    "a": "arm-reconfiguration",
+    "c": "compliance-tuning",
+    "b": "balance-lock",
 }
 Seat = tuple[str, int]
 
@@ -103,19 +106,24 @@ def of(folder: str) -> tuple[Campaign, list[Row]]:
     return campaign, campaign.rows()
 
 
+def count(rows: Sequence[Row]) -> str:
+    """How many runs, and how many gave no result."""
+    return f"{len(rows)} runs, {sum(not r.ok for r in rows)} without a result"
+
+
 def main(main_folder: str, subset_folder: str) -> None:
     """Print all tables."""
     campaign, rows = of(main_folder)
-    print(
-        f"{len(rows)} runs, {sum(r.status != 'ok' for r in rows)} without a result, seeds from {campaign.plan.spec.seed}"
-    )
+    print(f"{count(rows)}, seeds from {campaign.plan.spec.seed}")
     effect(results_of(campaign.plan, rows))
-    campaign, rows = of(subset_folder)
-    names = [a.id for a in campaign.plan.spec.arms if a.id not in ("shadow", "by-cause", "protocol")]
-    print(f"\n{len(rows)} runs, {sum(r.status != 'ok' for r in rows)} without a result")
-    print("\n" + ", ".join(f"{k.lower()} {v}" for k, v in PROTOCOLS.items()))
-    subsets(rows, [*names, "by-cause", "protocol"])
-    savable(rows, names, ("by-cause", "protocol"))
+    campaign, some = of(subset_folder)
+    print(f"\n{count(some)}; shadow, by-cause and protocol from the runs above with the same seeds")
+    print("\n" + ", ".join(f"{k} {v}" for k, v in PROTOCOLS.items()))
+    seats = {seat(r) for r in some}
+    joined = [*some, *(r for r in rows if seat(r) in seats)]
+    arms = [a.id for a in campaign.plan.spec.arms]
+    subsets(joined, [*arms, "by-cause", "protocol"])
+    savable(joined, arms, ("by-cause", "protocol"))
 
 
 if __name__ == "__main__":
