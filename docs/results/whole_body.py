@@ -1,19 +1,28 @@
-"""Tables of whole-body.md from its campaigns.
+"""Tables of whole-body.md.
 
+python docs/results/whole_body.py nominal
 python docs/results/whole_body.py out/whole-body out/whole-body-subsets
 """
 
 from __future__ import annotations
 
 import sys
+import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from foreshock.campaign.engine import Campaign, reopen
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.results import ArmResult, results_of
+from foreshock.records import Decision
 from foreshock.registry import Registry
+from foreshock.session.isolated import build_twin
 from foreshock.session.rates import wilson
+from foreshock.session.scenario import find_scenario
+from foreshock.session.simulate import simulate
+from foreshock.supervisor import Supervisor
 
 PROTOCOLS = {
     "s": "step-suppression",
@@ -21,6 +30,8 @@ PROTOCOLS = {
     "c": "compliance-tuning",
     "b": "balance-lock",
 }
+KINDS = ("foot-micro-slip", "torso-angular-spike", "com-lateral-deviation", "sway-amplitude-increase")
+SEED = 60000
 Seat = tuple[str, int]
 
 
@@ -106,6 +117,42 @@ def of(folder: str) -> tuple[Campaign, list[Row]]:
     return campaign, campaign.rows()
 
 
+def nominal() -> None:
+    """60 s of standing and of walking, supervised: interventions, and the largest statistics."""
+    registry = Registry()
+    walks = [{"step_length": x} for x in (0.0, 0.1, 0.2)]
+    cases = [("nominal-standing", {}), *(("nominal", walk) for walk in walks)]
+    rows = []
+    for suffix, values in cases:
+        scenario = find_scenario(f"a1-fall-onto-human-{suffix}", registry, "mujoco").with_(values)
+        scenario = replace(scenario, duration_s=60.0)
+        with tempfile.TemporaryDirectory() as scratch:
+            twin = build_twin(scenario, registry, Path(scratch))
+            supervisor = Supervisor(scenario.supervisor(), Path(scenario.folder), registry)
+            largest = Largest()
+            run = simulate(scenario, twin, supervisor, "on", SEED, detail=False, journals=[largest])
+            supervisor.close()
+            twin.close()
+        what = "standing" if not values else f"walking, {100 * values['step_length']:g} cm a step"
+        seen = (f"{largest.share[k]:.2f}" for k in KINDS)
+        rows.append((what, str(len(run.interventions)), str(len(run.first_s)), str(len(run.events)), *seen))
+        print(rows[-1], file=sys.stderr, flush=True)
+    table(("60 s of", "interventions", "precursors", "events", *KINDS), rows)
+
+
+class Largest:
+    """A journal that keeps the largest statistic of each kind, as a share of its threshold."""
+
+    def __init__(self) -> None:
+        self.share = dict.fromkeys(KINDS, 0.0)
+
+    def tick(self, samples: object, decision: Decision, verdicts: object) -> None:  # noqa: ARG002 # the port's
+        """Take one tick."""
+        for i in decision.indications:
+            if i.kind in self.share:
+                self.share[i.kind] = max(self.share[i.kind], i.statistic / i.threshold)
+
+
 def count(rows: Sequence[Row]) -> str:
     """How many runs, and how many gave no result."""
     return f"{len(rows)} runs, {sum(not r.ok for r in rows)} without a result"
@@ -127,4 +174,7 @@ def main(main_folder: str, subset_folder: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    if sys.argv[1:] == ["nominal"]:
+        nominal()
+    else:
+        main(*sys.argv[1:])
