@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -53,11 +53,13 @@ def short(scenario: str) -> str:
     return scenario.partition("@")[0]
 
 
-def effect(results: Sequence[ArmResult]) -> None:
-    """Accidents by scenario and arm, paired with the runs in shadow."""
+def effect(results: Sequence[ArmResult], calm: Collection[str]) -> None:
+    """Accidents by scenario and arm, paired with the runs in shadow; calm are scenarios without an accident."""
     rows = []
     for r in results:
         if r.scope.kind not in ("overall", "scenario", "mode"):
+            continue
+        if r.scope.name in calm and not (r.accidents.k or r.harmed or (r.false and r.false.k)):
             continue
         d, lead = r.difference, r.lead_quartiles_s
         rows.append(
@@ -113,7 +115,7 @@ def savable(rows: Sequence[Row], arms: Sequence[str], judged: Sequence[str]) -> 
 
 def of(folder: str) -> tuple[Campaign, list[Row]]:
     """A campaign and its rows."""
-    campaign, _ = reopen(Path(folder), Registry(), accept=True)
+    campaign, _ = reopen(Path(folder), Registry())
     return campaign, campaign.rows()
 
 
@@ -162,7 +164,9 @@ def main(main_folder: str, subset_folder: str) -> None:
     """Print all tables."""
     campaign, rows = of(main_folder)
     print(f"{count(rows)}, seeds from {campaign.plan.spec.seed}")
-    effect(results_of(campaign.plan, rows))
+    calm = {id_ for id_, s in campaign.plan.scenarios.items() if s.expect == "none"}
+    effect(results_of(campaign.plan, rows), calm)
+    print(f"\nNo line: {len(calm)} scenarios without an accident, in which the arm did nothing and nothing happened.")
     campaign, some = of(subset_folder)
     print(f"\n{count(some)}; shadow, by-cause and protocol from the runs above with the same seeds")
     print("\n" + ", ".join(f"{k} {v}" for k, v in PROTOCOLS.items()))
