@@ -37,7 +37,7 @@ class ByCauseConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ByCause:
-    """Acts from the caution level on, and as soon as an accident is predicted.
+    """Acts from the caution level on, and in A1 as soon as a fall is predicted.
 
     The cause is the kind with the earliest onset inside the window: what comes later is its consequence. A robot that
     tips over its heel slides in the end, and one that slides is thrown about in the end.
@@ -52,7 +52,7 @@ class ByCause:
         """The actions of the cause, at full strength; a level that is missing counts as the worst."""
         level = situation.levels.get(self._mode, ProtectionLevel.MINIMAL_RISK)
         left_s = situation.time_to(self._mode)
-        if level < ProtectionLevel.CAUTION and left_s is None:
+        if level < ProtectionLevel.CAUTION and (left_s is None or not self._causes.predicted):
             return ()
         actions, rule = self._chosen(situation, left_s)
         if self._always is not None:
@@ -66,7 +66,7 @@ class ByCause:
         causes = self._causes
         known = [(p.onset_ns, p.kind) for p in situation.precursors if p.kind in self._by_kind]
         if not known:
-            if left_s is not None:
+            if left_s is not None and causes.predicted:
                 return causes.predicted, "predicted before any precursor"
             return causes.after, "the evidence has gone, the level stands"
         first = min(known)[1]

@@ -25,7 +25,7 @@ class Causes(msgspec.Struct, frozen=True):
 
     Attributes:
         causes: by first sign.
-        predicted: actions where an accident is predicted before any precursor has come.
+        predicted: actions where an accident is predicted before any precursor has come; none to wait for one.
         after: actions while the level stands although all evidence has left the window.
         early_s: with a predicted time of more than this, a cause's early actions are enough; no prediction is no time.
         mitigation: asked for as well while an accident is predicted; the arbiter takes it when nothing else helps.
@@ -54,7 +54,8 @@ CAUSES: Mapping[str, Causes] = {
             Cause(("excessive-arm-velocity", "rapid-torso-recovery"), ARMS, early=("soften-arms",)),
             Cause(("human-proximity-breach",), ARMS),
         ),
-        predicted=ARMS,
+        # whoever walks past is predicted to come near, seconds before
+        predicted=(),
         after=("soften-arms",),
     ),
     "A3": Causes(
@@ -65,7 +66,7 @@ CAUSES: Mapping[str, Causes] = {
                 early=("shorten-step", "announce"),
             ),
         ),
-        predicted=("step-suppression", "announce"),
+        predicted=(),
         after=("shorten-step", "announce"),
     ),
 }

@@ -242,8 +242,9 @@ class Gait:
             goes = Foothold(*(a + (1.0 - strength) * (b - a) for a, b in zip(place, target, strict=True)))
             self._landing = (height, velocity[2], 0.0, place, goes)
             self._landing_t = 0.0
+        # who stands has nothing to put down: the plan stays where it is, and feedback brings the robot back to it
+        self.com, self._rate = (self.com, (0.0, 0.0)) if self.standing else (com, rate)
         self.settling = True
-        self.com, self._rate = com, rate
 
     def resume(self) -> None:
         """Stand where the feet are; steps may begin again."""
