@@ -10,11 +10,11 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from tests.bench import campaign, core, fmu_step, live, tick
+from tests.bench import campaign, core, fmu_step, live, tick, whole_body
 from tests.bench.rows import Row
 
 OUT = Path("bench.json")
-PARTS = {part.__name__.rpartition(".")[2]: part for part in (tick, core, fmu_step, live, campaign)}
+PARTS = {part.__name__.rpartition(".")[2]: part for part in (tick, core, fmu_step, whole_body, live, campaign)}
 
 
 def main() -> int:

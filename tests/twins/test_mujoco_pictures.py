@@ -81,7 +81,7 @@ def red(picture):
 
 def test_a_film_has_the_size_and_the_frames_that_it_should(opengl, tmp_path):
     model = cube()
-    takes = [shown(flight(model, 0.5)), shown(flight(model, 0.2))]
+    takes = [shown(flight(model, 0.2)), shown(flight(model, 0.1))]
     stage = Stage(model, takes)
     writers._mp4(tmp_path / "f.mp4", stage, ())
     writers._gif(tmp_path / "f.gif", stage, ())
@@ -89,7 +89,7 @@ def test_a_film_has_the_size_and_the_frames_that_it_should(opengl, tmp_path):
     with av.open(str(tmp_path / "f.mp4")) as film:
         frames = list(film.decode(video=0))
         assert film.streams.video[0].average_rate == writers.MP4_FPS
-    assert len(frames) == writers.MP4_FPS // 2 + 1
+    assert len(frames) == writers.MP4_FPS // 5 + 1
     assert (frames[0].width, frames[0].height) == stage.size == (2 * WIDTH, HEIGHT + 60)
     assert len(red(frames[0].to_ndarray(format="rgb24"))[0]) > 1000
     with Image.open(tmp_path / "f.gif") as gif:
@@ -99,7 +99,7 @@ def test_a_film_has_the_size_and_the_frames_that_it_should(opengl, tmp_path):
         for k in range(gif.n_frames):
             gif.seek(k)
             shown_ms += gif.info["duration"]
-        assert shown_ms == 1000 // writers.GIF_FPS * (writers.GIF_FPS // 2 + 1)
+        assert shown_ms == 1000 // writers.GIF_FPS * (writers.GIF_FPS // 5 + 1)
 
 
 def test_the_camera_follows_over_the_floor_and_shows_what_rises(opengl):

@@ -24,7 +24,7 @@ Actions, each with a strength 0..1, ramped up and down:
 - ``balance-lock``: capture point feedback three times as strong, and there when the walk's own feedback is lost;
 - ``speed-scale``, ``shorten-step``: shorter, and lower, steps from the next one on;
 - ``protective-stop``: the motion is stopped in 0.1 s wherever it is, and balance feedback with it; ``hold``: the same,
-  with feedback: both topple a robot on one leg;
+  with feedback: either may topple a robot on one leg;
 - ``minimal-risk``: step-suppression and balance-lock;
 - ``impact-mitigation``: knees yield once it falls; ``announce``: nothing that the physics sees.
 

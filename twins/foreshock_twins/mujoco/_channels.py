@@ -77,8 +77,10 @@ class Channels:
         return Imu(_vector(m.attitude), _vector(m.gyro), _vector(m.acceleration), self._body.robot.torso)
 
     def _wrench(self, m: Measured, side: int) -> AnyMessage:
-        w = m.wrenches[side].tolist()
-        return WrenchStamped((w[0], w[1], w[2]), (w[3], w[4], w[5]), getattr(self._body.robot, f"{SIDES[side]}_foot"))
+        """On and about the sole, which is a link of the robot's model only where it lies in the frame of the foot."""
+        w, robot = m.wrenches[side].tolist(), self._body.robot
+        frame = f"{SIDES[side]}_sole" if robot.sole_z_m else getattr(robot, f"{SIDES[side]}_foot")
+        return WrenchStamped((w[0], w[1], w[2]), (w[3], w[4], w[5]), frame)
 
     def _hand(self, frame: int, link: str) -> Callable[[Measured], AnyMessage]:
         return lambda m: self._link(m, frame, link)

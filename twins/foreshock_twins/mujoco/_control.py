@@ -112,7 +112,6 @@ class Controller:
         self._arms_out = body.change(body.robot.arms("arms_out"), "arms_out")
         self._arms_in = body.change(body.robot.arms("arms_in"), "arms_in")
         self._arms_forward = body.change(body.robot.arms("arms_forward"), "arms_forward")
-        self._q_start: Floats | None = None
 
     def reset(self, parameters: Mapping[str, float]) -> Floats:
         """Begin a run; the configuration to start in (Pinocchio, nq)."""

@@ -31,7 +31,7 @@ class Disturbances:
         """
         p, body = parameters, self._body
         self._p, self._model, self._data = p, model, data
-        if not (p["weak_joint"].is_integer() and p["weak_joint"] < len(body.joints)):
+        if not p["weak_joint"] < len(body.joints):
             raise ConfigError(
                 "parameters",
                 f"'weak_joint' = {p['weak_joint']!r} is no number of a joint",

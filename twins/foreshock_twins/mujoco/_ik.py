@@ -77,10 +77,6 @@ class InverseKinematics:
                 torque -= jacobian.T @ np.linalg.solve(jacobian[:, :6].T, share * base)
         return torque
 
-    def error(self) -> float:
-        """Largest error before the last step (m or rad)."""
-        return float(np.abs(self._errors).max())
-
 
 def _turned(yaw: float) -> Floats:
     c, s = math.cos(yaw), math.sin(yaw)

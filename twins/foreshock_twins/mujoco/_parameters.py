@@ -22,6 +22,8 @@ class Parameter(NamedTuple):
 
 
 _BIG = 1e9
+_WHOLE = frozenset({"drop_foot", "human", "weak_joint"})
+"""They choose one of several: half a foot would quietly be none."""
 
 PARAMETERS: Mapping[str, Parameter] = {
     # walk
@@ -53,7 +55,7 @@ PARAMETERS: Mapping[str, Parameter] = {
     "payload_time": Parameter(0.0, "s", 0.0, _BIG, "when it takes them up"),
     # control and drives
     "delay": Parameter(0.005, "s", 0.0, 0.2, "age of the measurements that balance control uses"),
-    "lag": Parameter(0.0, "s", 0.0, 0.5, "added to that age, and to that of all channels but the human's"),
+    "lag": Parameter(0.0, "s", 0.0, 0.5, "added to that age, and to that of all measurements but the human's"),
     "lag_time": Parameter(4.0, "s", 0.0, _BIG, "from when on"),
     "lag_duration": Parameter(_BIG, "s", 0.0, _BIG, "for how long"),
     "blind_time": Parameter(4.0, "s", 0.0, _BIG, "when balance feedback is lost"),
@@ -73,7 +75,7 @@ PARAMETERS: Mapping[str, Parameter] = {
     "reach_z": Parameter(1.1, "m", 0.0, 3.0, "where his hand goes"),
     "reach_duration": Parameter(0.6, "s", 0.1, 10.0, "how long it takes"),
     # sensors: standard deviations of white noise
-    "latency": Parameter(0.005, "s", 0.0, 0.5, "age of what the channels show"),
+    "latency": Parameter(0.005, "s", 0.0, 0.5, "age of the measurements that the channels show"),
     "camera_latency": Parameter(0.06, "s", 0.0, 1.0, "age of the human's track"),
     "encoder_noise": Parameter(1e-4, "rad", 0.0, 0.1, "joint position"),
     "joint_rate_noise": Parameter(0.01, "rad/s", 0.0, 1.0, "joint velocity"),
@@ -98,7 +100,7 @@ def values_of(given: Mapping[str, float]) -> dict[str, float]:
     """All parameter values: those given, else the defaults.
 
     Raises:
-        ConfigError: an unknown name, or a value outside its range.
+        ConfigError: an unknown name, a value outside its range, or a fraction where one of several is chosen.
     """
     for name, value in given.items():
         if name not in PARAMETERS:
@@ -107,4 +109,7 @@ def values_of(given: Mapping[str, float]) -> dict[str, float]:
         if not (math.isfinite(value) and p.low <= value <= p.high):
             expected = f"; expected {p.low!r} to {p.high!r} {p.unit}, finite"
             raise ConfigError("parameters", f"{name!r} = {value!r} is out of range", expected)
+        if name in _WHOLE and not float(value).is_integer():
+            expected = f"; expected a whole number from {p.low:.0f} to {p.high:.0f}"
+            raise ConfigError("parameters", f"{name!r} = {value!r} is none of its choices", expected)
     return {name: float(given.get(name, p.start)) for name, p in PARAMETERS.items()}
