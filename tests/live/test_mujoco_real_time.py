@@ -149,8 +149,8 @@ def served(path: Path, endpoint: str) -> Iterator[subprocess.Popen[str]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", ["ice", "a dead supervisor"])
-def test_it_walks_under_the_lease_and_stands_when_it_is_told_or_nobody_is_there(tmp_path: Path, what: str) -> None:
+@pytest.mark.parametrize("what", ["ice", "a dead supervisor", "a supervisor that pauses"])
+def test_it_walks_under_the_lease_and_stands_when_told_or_without_one(tmp_path: Path, what: str) -> None:
     path, endpoint = tmp_path / "walk.toml", free_endpoint()
     path.write_text(SCENARIO + ("drop_duration = 60.0\n" if what == "ice" else ""))
     watch = Watch(endpoint)
@@ -162,8 +162,12 @@ def test_it_walks_under_the_lease_and_stands_when_it_is_told_or_nobody_is_there(
             if what == "ice":
                 until(lambda: watch.asked.get("step-suppression") == 1.0, "the supervisor sees the soles slip")
             else:
-                os.kill(process.pid, signal.SIGKILL)
+                os.kill(process.pid, signal.SIGKILL if what == "a dead supervisor" else signal.SIGSTOP)
             until(watch.stands, "it puts its foot down and stays")
+            if what == "a supervisor that pauses":
+                os.kill(process.pid, signal.SIGCONT)
+                steps = watch.steps
+                until(lambda: watch.steps > steps + 1, "the lease is back, and it walks on")
             assert twin.poll() is None
     finally:
         watch.close()

@@ -30,6 +30,7 @@ from foreshock.wire import (
 
 __all__ = ["FreeRunning", "SteppedServer"]
 
+_MINIMAL_RISK = "minimal-risk"
 BY_NAME = {cls.__name__: ros for cls, ros in ROS_NAMES.items()}
 
 
@@ -126,6 +127,7 @@ class FreeRunning:
 
         self._twin, self._codec, self._lock = twin, Codec(), threading.Lock()
         self._waiting: list[Intervention] = []
+        self._why, self._lapsed, self._asked = "", False, 0.0
         name = str(wall_ns())
         self.guard = Guard(robot, self._intervened, self._minimal_risk, link, f"twin-{name}", base=base)
         self._session: Any = open_link(link, base)
@@ -166,8 +168,19 @@ class FreeRunning:
     def _step(self, now_ns: int, began_ns: int) -> None:
         with self._lock:
             waiting, self._waiting = self._waiting, []
+            why, self._why = self._why, ""
         for intervention in waiting:
-            self._twin.intervene(intervention)
+            if intervention.action == _MINIMAL_RISK:
+                self._asked = intervention.strength
+            if not (self._lapsed and intervention.action == _MINIMAL_RISK):
+                self._twin.intervene(intervention)
+        if why:
+            self._lapsed = True
+            self._twin.intervene(Intervention(now_ns, _MINIMAL_RISK, 1.0, "", (why,)))
+        elif self._lapsed and self.guard.permitted():
+            # the lease is back: what its lapse asked for ends, unless the supervisor asks for it as well
+            self._lapsed = False
+            self._twin.intervene(Intervention(now_ns, _MINIMAL_RISK, self._asked))
         for sample in self._twin.advance(now_ns):
             # simulated time began when the run did: stamps are on this machine's monotonic clock
             stamp_ns = began_ns + sample.stamp_ns
@@ -183,7 +196,7 @@ class FreeRunning:
 
     def _minimal_risk(self, why: str) -> None:
         with self._lock:
-            self._waiting.append(Intervention(0, "minimal-risk", 1.0, "", (why,)))
+            self._why = why
 
 
 def _finite(probes: Mapping[str, float]) -> dict[str, float | None]:
