@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -141,8 +142,9 @@ class Robot:
         return True
 
     def _stream(self) -> None:
-        grip = GripState(True, 20.0, 5.0, 0.05, 20.0, 0.5, 0.0)
+        noise = random.Random(1)  # a sensor that repeats itself to the last bit is frozen
         while not self._ended.wait(0.01):
             if self.streaming:
+                grip = GripState(True, 20.0 + noise.gauss(0.0, 0.01), 5.0, 0.05, 20.0, 0.5, 0.0)
                 stamp_ns = time.time_ns() + self.jump_ns
                 self.put(self._codec.encode(grip, stamp_ns), self.attachment(stamp_ns))

@@ -149,6 +149,22 @@ def served(path: Path, endpoint: str) -> Iterator[subprocess.Popen[str]]:
 
 
 @pytest.mark.slow
+def test_it_does_not_move_before_the_first_lease(tmp_path: Path) -> None:
+    path, endpoint = tmp_path / "walk.toml", free_endpoint()
+    path.write_text(SCENARIO)
+    watch = Watch(endpoint)
+    try:
+        with served(path, endpoint):
+            # without a lease in the way it lifts a foot within 1 s
+            until(lambda: watch.stamps[-1:] > watch.stamps[:1] and watch.stands(), "it streams, and stands")
+            assert watch.steps == 0
+            with supervisor(tmp_path, endpoint, CONFIG):
+                until(lambda: watch.steps > 1, "it holds the lease, and walks")
+    finally:
+        watch.close()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["ice", "a dead supervisor", "a supervisor that pauses"])
 def test_it_walks_under_the_lease_and_stands_when_told_or_without_one(tmp_path: Path, what: str) -> None:
     path, endpoint = tmp_path / "walk.toml", free_endpoint()

@@ -115,6 +115,8 @@ class SteppedServer:
 class FreeRunning:
     """A twin on this machine's clock: it streams, holds the lease through a guard, and obeys interventions.
 
+    Without a lease it is at minimal risk: before the first, and after one that lapsed until the next.
+
     Args:
         twin: to host, reset already.
         robot: its name.
@@ -127,7 +129,7 @@ class FreeRunning:
 
         self._twin, self._codec, self._lock = twin, Codec(), threading.Lock()
         self._waiting: list[Intervention] = []
-        self._why, self._lapsed, self._asked = "", False, 0.0
+        self._why, self._lapsed, self._asked = "no motion lease yet", False, 0.0
         name = str(wall_ns())
         self.guard = Guard(robot, self._intervened, self._minimal_risk, link, f"twin-{name}", base=base)
         self._session: Any = open_link(link, base)
