@@ -97,6 +97,7 @@ class LeaseModel(RuleBasedStateMachine):
         answers = (lease.nonce, lease.guard_ns) in self.asked
         valid = answers and 0 < lease.ttl_ns <= self.max_ttl_ns
         fenced = self.epoch_taken is not None and lease.epoch < self.epoch_taken
+        newest_ns = self.newest_ns
         taken = self.guard.receive(lease)
         if taken:
             assert answers, "no answer to a request of its own"
@@ -104,11 +105,11 @@ class LeaseModel(RuleBasedStateMachine):
             assert not fenced, "a lower epoch than it has seen"
             self.at_most_ns = max(self.at_most_ns, lease.guard_ns + lease.ttl_ns)
             self.epoch_taken = lease.epoch
+            self.newest_ns = max(self.newest_ns, lease.guard_ns)  # a request is answered once
         surely = valid and lease.epoch >= 0 and (self.epoch_seen is None or lease.epoch >= self.epoch_seen)
         young = self.now_ns < lease.guard_ns + lease.ttl_ns
-        if surely and young and lease.guard_ns > self.newest_ns:
+        if surely and young and lease.guard_ns > newest_ns:
             assert taken, "an answer in time, from the highest epoch, newer than any other"
-            self.newest_ns = lease.guard_ns
             self.at_least_ns = lease.guard_ns + lease.ttl_ns
         self.epoch_seen = max(lease.epoch, self.epoch_seen if self.epoch_seen is not None else lease.epoch)
 

@@ -41,13 +41,12 @@ def cases(suite: DetectorConformance) -> Iterator[tuple[str, Callable[[], None]]
     for name in [n for n in dir(type(suite)) if n.startswith("test_")]:
         test = getattr(suite, name)
         wants = inspect.signature(test).parameters
-        values: dict[str, list[str]] = {}
+        values: dict[tuple[str, str], list[tuple[str, str]]] = {}
         suite.pytest_generate_tests(SimpleNamespace(fixturenames=list(wants), parametrize=values.__setitem__))
         if not wants:
             yield name, test
-        for lost_input in values.get("lost_input", []):
-            for loss in values["loss"]:
-                yield name, lambda i=lost_input, w=loss, t=test: t(i, w)  # type: ignore[misc]
+        for lost_input, loss in values.get(("lost_input", "loss"), []):
+            yield name, lambda i=lost_input, w=loss, t=test: t(i, w)  # type: ignore[misc]
 
 
 def failure(build: type[rogues.Upright], wanted: str) -> str:
