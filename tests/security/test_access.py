@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
 import tomllib
 from collections.abc import Iterator
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -209,7 +209,8 @@ def test_nobody_but_the_supervisor_tells_a_guard_anything(plant: Plant) -> None:
 def test_only_an_operator_resets(plant: Plant) -> None:
     payload = b'{"who": "jane", "why": "looked at it"}'
     with plant.open("robot") as robot:  # before its streams have begun nothing is judged, and nothing is latched
-        until(lambda k=count(): stream(robot, next(k)) or samples(plant, robot) > 0, "the robot streams")
+        numbers = itertools.count()
+        until(lambda: stream(robot, next(numbers)) or samples(plant, robot) > 0, "the robot streams")
     for name, may in (("viewer", False), ("scene", False), ("robot", False), ("operator", True)):
         with plant.open(name) as session:
             until(lambda s=session: plant.status(s), f"{name} may ask for the status")
