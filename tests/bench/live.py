@@ -66,7 +66,10 @@ config = { mode = "A9", caution = ["derate"], scale_speed = false }
 """
     + LINK
 )
-GRIP = '[supervisor]\nrobot = "robot"\nperiod_s = 0.005\n[[detectors]]\nuse = "grip"\n' + LINK
+GRIP = (
+    '[supervisor]\nrobot = "robot"\nperiod_s = 0.005\n[[detectors]]\nuse = "grip"\nstandstill_s = { grip = 0.0 }\n'
+    + LINK
+)
 FAST = '[supervisor]\nrobot = "robot"\nperiod_s = 0.001\n[[detectors]]\nuse = "telemetry"\n' + LINK
 ECHO = """
 import sys, time
