@@ -22,6 +22,8 @@ from foreshock.link import LinkSettings, open_link
 from foreshock.live import Status
 from foreshock.messages import GripState
 from foreshock.records import Intervention
+from foreshock.session.isolated import Job, run_one
+from foreshock.session.scenario import Scenario
 from foreshock.wire import Codec, Keys, pack_attachment
 
 CONFIG = """
@@ -84,6 +86,28 @@ def supervisor(folder: Path, endpoint: str, text: str = CONFIG) -> Iterator[subp
                 process.wait()
         if process.stderr is not None:
             process.stderr.close()
+
+
+def assert_the_same_over_zenoh(scenario: Scenario, served: str) -> None:
+    """A stepped run of a twin that another process serves is the run in process, digest for digest."""
+    here = run_one(Job(scenario, "on", 5))
+    assert here.interventions, "what goes to the twin matters as much as what comes from it"
+    endpoint = free_endpoint()
+    command = [sys.executable, "-m", "foreshock", "twin", "serve", served, "--listen", endpoint]
+    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        assert server.stderr is not None
+        assert endpoint in server.stderr.readline()
+        over = msgspec.structs.replace(scenario, twin={"kind": "zenoh", "endpoint": endpoint})
+        for _ in range(2):  # and again after a reset
+            there = run_one(Job(over, "on", 5))
+            assert there.digest == here.digest
+            assert (there.outcome, there.end_s) == (here.outcome, here.end_s)
+    finally:
+        server.terminate()
+        server.wait(20)
+        if server.stderr is not None:
+            server.stderr.close()
 
 
 class Robot:

@@ -3,30 +3,21 @@
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import msgspec
 
 from foreshock._strict import within
 from foreshock.clock import ns
-from foreshock.errors import ConfigError, MissingExtraError, nearest
+from foreshock.errors import ConfigError, nearest
 from foreshock.policy import Proposal, Situation
 from foreshock.records import Precursor
+from foreshock.stl import WORDS, specification
 from foreshock.taxonomy import builtin_taxonomy
 from foreshock_detectors.baselines._protective import Protective, check
 
 __all__ = ["Stl", "StlConfig"]
 
-# fmt: off
-WORDS = frozenset({
-    "always", "eventually", "once", "historically", "until", "since", "unless", "not", "and", "or", "xor", "implies",
-    "iff", "rise", "fall", "next", "prev", "true", "false", "abs", "sqrt", "exp", "pow", "log", "s", "ms", "us", "ns",
-    "G", "F", "H", "O", "U", "S", "X", "Y",
-})
-# fmt: on
-"""Words of RTAMT's formulas that are no signals."""
 NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")
 SUFFIXES = ("_onset", "_severity")
 
@@ -81,7 +72,8 @@ class Stl:
         self._step_ns, self._count = ns(config.step_s), round(config.window_s / config.step_s) + 1
         self._signals = _signals(self._formula)
         self._kinds = frozenset(kind for kind, _ in self._signals.values())
-        self._evaluate = _monitor(self._formula, tuple(self._signals), config.step_s)
+        names = tuple(self._signals)
+        self._evaluate = specification(self._formula, names, config.step_s, "policies", "policy 'stl'").evaluate
         self._times = [k * config.step_s for k in range(self._count)]
         try:
             self._calm = self.robustness((), 0)
@@ -105,7 +97,7 @@ class Stl:
         for name, (kind, what) in self._signals.items():
             mine = [p for p in seen if p.kind == kind]
             data[name] = [self._sampled(mine, what, t) for t in stamps]
-        return min(value for _, value in self._evaluate(data))
+        return min(float(value) for _, value in self._evaluate(data))
 
     def _sampled(self, mine: Sequence[Precursor], what: str, t_ns: int) -> float:
         if what == "_severity":
@@ -135,28 +127,3 @@ def _signals(formula: str) -> dict[str, tuple[str, str]]:
     if not found:
         raise ConfigError("formula", f"{formula!r} names no kind of precursor, e.g. foot_micro_slip")
     return found
-
-
-def _monitor(
-    formula: str, names: Sequence[str], step_s: float
-) -> Callable[[Mapping[str, list[float]]], list[tuple[float, float]]]:
-    """RTAMT's evaluation of the formula on sampled signals."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # its parser imports typing.io
-            import rtamt
-    except ImportError as e:
-        problem = f"policy 'stl' needs rtamt, which cannot be imported: {e}"
-        raise MissingExtraError("policies", problem, "; run: pip install 'foreshock[campaign]' (Python < 3.13)") from e
-    spec: Any = rtamt.StlDiscreteTimeSpecification()
-    try:
-        spec.set_sampling_period(round(step_s * 1e6), "us", 0.1)
-        spec.unit = "s"
-        for name in names:
-            spec.declare_var(name, "float")
-        spec.spec = formula
-        spec.parse()
-    except rtamt.RTAMTException as e:
-        raise ConfigError("formula", f"RTAMT refuses {formula!r}: {e}") from e
-    evaluate: Callable[[Mapping[str, list[float]]], list[tuple[float, float]]] = spec.evaluate
-    return evaluate

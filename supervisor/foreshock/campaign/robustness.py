@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-from foreshock.errors import ConfigError, MissingExtraError, nearest
+from foreshock.errors import ConfigError, nearest
+from foreshock.stl import WORDS, specification
 
 __all__ = ["Robustness"]
 
-# fmt: off
-WORDS = frozenset({
-    "always", "eventually", "once", "historically", "until", "since", "unless", "not", "and", "or", "xor", "implies",
-    "iff", "rise", "fall", "next", "prev", "true", "false", "abs", "sqrt", "exp", "pow", "log", "s", "ms", "us", "ns",
-    "G", "F", "H", "O", "U", "S", "X", "Y",
-})
-# fmt: on
-"""Words of RTAMT's formulas that are no signals."""
 NAME = re.compile(r"(?<![\w.])[A-Za-z_$][\w$./]*")
 """A signal as RTAMT reads it: a slash belongs to a name that it follows."""
 
@@ -40,7 +31,7 @@ class Robustness:
         self._names = tuple(n for n in dict.fromkeys(NAME.findall(formula)) if n not in WORDS)
         if not self._names:
             raise ConfigError("formula", f"{formula!r} names no probe of the plant")
-        self._evaluate = _specification(formula, self._names, step_s).evaluate
+        self._evaluate = specification(formula, self._names, step_s).evaluate
 
     def of(self, series: Mapping[str, Sequence[float]]) -> float:
         """Of a run's series, whose columns ``true:<probe>`` are the probes.
@@ -57,24 +48,3 @@ class Robustness:
                 raise ConfigError("formula", f"{name!r} is no probe of the plant", hint)
             data[name] = series[f"true:{name}"]
         return float(self._evaluate(data)[0][1])
-
-
-def _specification(formula: str, names: Sequence[str], step_s: float) -> Any:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # its parser imports typing.io
-            import rtamt
-    except ImportError as e:
-        needs = f"needs rtamt, which cannot be imported: {e}"
-        raise MissingExtraError("formula", needs, "; run: pip install 'foreshock[campaign]' (Python < 3.13)") from e
-    spec: Any = rtamt.StlDiscreteTimeSpecification()
-    try:
-        spec.set_sampling_period(round(step_s * 1e6), "us", 0.1)
-        spec.unit = "s"
-        for name in names:
-            spec.declare_var(name, "float")
-        spec.spec = formula
-        spec.parse()
-    except rtamt.RTAMTException as e:
-        raise ConfigError("formula", f"RTAMT refuses {formula!r}: {e}") from e
-    return spec
