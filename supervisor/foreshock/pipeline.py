@@ -16,7 +16,7 @@ from foreshock.channels import ChannelView, unread
 from foreshock.containment import Contained, proposals_of
 from foreshock.detector import Input
 from foreshock.errors import BadInputError, nearest
-from foreshock.policy import Arbiter, ArbiterState, Policy, Proposal, Situation
+from foreshock.policy import MINIMAL_RISK, Arbiter, ArbiterState, Policy, Proposal, Situation
 from foreshock.records import Decision, Explanation, Intervention, Precursor, ProtectionLevel, Sample
 from foreshock.risk import RiskModel
 from foreshock.taxonomy import Taxonomy
@@ -210,7 +210,7 @@ class Pipeline:
                 why = fault or "latched until an operator resets it"
                 if overdue:
                     why = f"unobserved beyond the grace time: {', '.join(trust.unobserved)}"
-                proposals.append(Proposal("minimal-risk", 1.0, ProtectionLevel.MINIMAL_RISK, "", why))
+                proposals.append(Proposal(MINIMAL_RISK, 1.0, ProtectionLevel.MINIMAL_RISK, "", why))
             arbiter, held, changes = self._arbiter.step(state.arbiter, situation, proposals)
         level = max(by_mode.values(), default=ProtectionLevel.NORMAL)
         if overall.level is ProtectionLevel.MINIMAL_RISK:

@@ -13,7 +13,17 @@ import msgspec
 
 from foreshock.records import Intervention, Precursor, ProtectionLevel
 
-__all__ = ["ACTIONS", "ActionSpec", "Arbiter", "ArbiterState", "Policy", "PolicySpec", "Proposal", "Situation"]
+__all__ = [
+    "ACTIONS",
+    "MINIMAL_RISK",
+    "ActionSpec",
+    "Arbiter",
+    "ArbiterState",
+    "Policy",
+    "PolicySpec",
+    "Proposal",
+    "Situation",
+]
 
 
 class ActionSpec(msgspec.Struct, frozen=True):
@@ -42,6 +52,8 @@ class ActionSpec(msgspec.Struct, frozen=True):
     source: str = ""
 
 
+MINIMAL_RISK = "minimal-risk"
+"""The action where nothing is observed any more, or nobody permits motion; the arbiter always finds time for it."""
 PAPER = "section 3.3, safety protocols at T < 0.3"
 ACTIONS: Mapping[str, ActionSpec] = {
     a.id: a
@@ -60,7 +72,7 @@ ACTIONS: Mapping[str, ActionSpec] = {
         ),
         ActionSpec("balance-lock", "power-assisted balance lock", ("balance",), 0.05, source=PAPER),
         ActionSpec(
-            "minimal-risk",
+            MINIMAL_RISK,
             "go to the minimal risk condition",
             ("motion",),
             0.2,
@@ -155,7 +167,7 @@ class ArbiterState(msgspec.Struct, frozen=True):
 
 
 ANNOUNCE = "announce"
-UNCONDITIONAL = frozenset({"speed-scale", "minimal-risk"})
+UNCONDITIONAL = frozenset({"speed-scale", MINIMAL_RISK})
 MITIGATION_NS = 500_000_000
 """A mitigation that has begun holds for so long: as long as the last part of a fall takes."""
 

@@ -47,7 +47,7 @@ grace_s = 10.0  # the machine may be busy
 [gates.modes.A1]
 caution = 0.9
 hysteresis = 0.05
-dwell_s = 30.0
+dwell_s = 1.0
 
 [[policies]]
 use = "by-cause"
@@ -59,7 +59,7 @@ listen = []
 connect = ["{endpoint}"]
 
 [live]
-ttl_s = 0.3
+ttl_s = 1.0  # likewise
 """
 SCENARIO = """
 id = "walk"

@@ -13,6 +13,7 @@ from foreshock.clock import NS_PER_S, monotonic_ns, sleep_until, wall_ns
 from foreshock.errors import ForeshockError
 from foreshock.guard import Guard
 from foreshock.link import LinkSettings, keys_of, open_link, ros_tokens
+from foreshock.policy import MINIMAL_RISK
 from foreshock.records import Intervention
 from foreshock.twin import Twin
 from foreshock.wire import (
@@ -30,7 +31,6 @@ from foreshock.wire import (
 
 __all__ = ["FreeRunning", "SteppedServer"]
 
-_MINIMAL_RISK = "minimal-risk"
 BY_NAME = {cls.__name__: ros for cls, ros in ROS_NAMES.items()}
 
 
@@ -172,17 +172,17 @@ class FreeRunning:
             waiting, self._waiting = self._waiting, []
             why, self._why = self._why, ""
         for intervention in waiting:
-            if intervention.action == _MINIMAL_RISK:
+            if intervention.action == MINIMAL_RISK:
                 self._asked = intervention.strength
-            if not (self._lapsed and intervention.action == _MINIMAL_RISK):
+            if not (self._lapsed and intervention.action == MINIMAL_RISK):
                 self._twin.intervene(intervention)
         if why:
             self._lapsed = True
-            self._twin.intervene(Intervention(now_ns, _MINIMAL_RISK, 1.0, "", (why,)))
+            self._twin.intervene(Intervention(now_ns, MINIMAL_RISK, 1.0, "", (why,)))
         elif self._lapsed and self.guard.permitted():
             # the lease is back: what its lapse asked for ends, unless the supervisor asks for it as well
             self._lapsed = False
-            self._twin.intervene(Intervention(now_ns, _MINIMAL_RISK, self._asked))
+            self._twin.intervene(Intervention(now_ns, MINIMAL_RISK, self._asked))
         for sample in self._twin.advance(now_ns):
             # simulated time began when the run did: stamps are on this machine's monotonic clock
             stamp_ns = began_ns + sample.stamp_ns

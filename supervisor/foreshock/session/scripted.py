@@ -14,7 +14,7 @@ import numpy as np
 from foreshock._strict import convert
 from foreshock.clock import ns
 from foreshock.config import Config
-from foreshock.policy import ACTIONS, Arbiter, ArbiterState, Situation
+from foreshock.policy import ACTIONS, MINIMAL_RISK, Arbiter, ArbiterState, Situation
 from foreshock.records import Intervention, ProtectionLevel
 from foreshock.registry import Registry
 from foreshock.taxonomy import builtin_taxonomy
@@ -23,8 +23,6 @@ __all__ = ["acts_of", "held", "moved", "protective"]
 
 CHEAP = frozenset({"speed-scale", "announce"})
 """Actions that cost little and are no intervention in the sense of an arm that acts by action."""
-MINIMAL_RISK = "minimal-risk"
-"""An intervention whatever the mode: nobody sees any more."""
 
 
 def acts_of(changes: Sequence[Intervention], mode: str) -> list[Intervention]:

@@ -19,7 +19,7 @@ from foreshock.twin import Channel, Parameters, TwinEvent
 from foreshock_twins.mujoco._channels import PERIOD_NS, Channels
 from foreshock_twins.mujoco._control import ACTIONS, Controller
 from foreshock_twins.mujoco._disturb import Disturbances
-from foreshock_twins.mujoco._model import STEP_S, Body
+from foreshock_twins.mujoco._model import STEP_S, Body, Floats
 from foreshock_twins.mujoco._parameters import values_of
 from foreshock_twins.mujoco._people import People
 from foreshock_twins.mujoco._poses import Poses
@@ -156,13 +156,14 @@ class MujocoTwin:
         data, body, referee = self._data, self._body, self._referee
         com, rate = data.subtree_com[body.base_id], self._com_rate()
         omega = self._control.gait.omega
-        zmp = self._zmp()
+        wrenches = self._sensors.true_wrenches(data)
+        zmp = self._zmp(wrenches)
         found = {"com_x": com[0], "com_y": com[1], "com_z": com[2], "com_vx": rate[0], "com_vy": rate[1]}
         found |= {"xi_x": com[0] + rate[0] / omega, "xi_y": com[1] + rate[1] / omega, "zmp_x": zmp[0], "zmp_y": zmp[1]}
         for side, site in zip(("left", "right"), self._sensors.sole_sites, strict=True):
             place = data.site_xpos[site]
             found |= {f"foot_{side}_x": place[0], f"foot_{side}_y": place[1], f"foot_{side}_z": place[2]}
-        for side, wrench in zip(("left", "right"), self._sensors.true_wrenches(data), strict=True):
+        for side, wrench in zip(("left", "right"), wrenches, strict=True):
             found[f"load_{side}"] = wrench[2]
         found |= {"tilt": self._tilt(), "error_x": self._control.error[0], "error_y": self._control.error[1]}
         found |= {"contact_force": referee.force, "contact_force_peak": referee.peak, "floor_peak": referee.floor_peak}
@@ -302,11 +303,11 @@ class MujocoTwin:
             off = max(off, low - reach[i] - xi, xi - high - reach[i])
         return off
 
-    def _zmp(self) -> tuple[float, float]:
+    def _zmp(self, wrenches: Floats) -> tuple[float, float]:
         """Centre of pressure of both soles on the ground; the last one while none is loaded."""
         data = self._data
         load = x = y = 0.0
-        for site, wrench in zip(self._sensors.sole_sites, self._sensors.true_wrenches(data), strict=True):
+        for site, wrench in zip(self._sensors.sole_sites, wrenches, strict=True):
             r, p = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
             (fx, fy, fz), (tx, ty, _) = (r @ wrench[:3]).tolist(), (r @ wrench[3:]).tolist()
             px, py, pz = p.tolist()
