@@ -113,12 +113,12 @@ def assert_the_same_over_zenoh(scenario: Scenario, served: str) -> None:
 class Robot:
     """Streams a steady grip at 100 Hz while ``streaming``."""
 
-    def __init__(self, endpoint: str) -> None:
+    def __init__(self, endpoint: str, streaming: bool = True) -> None:
         self.link = LinkSettings("peer", (), (endpoint,))
         self.keys = Keys("robot")
         self.interventions: list[Intervention] = []
         self.stops: list[str] = []
-        self.streaming = True
+        self.streaming = streaming
         self.jump_ns = 0
         self.guard = Guard("robot", self._take, self.stops.append, self.link, "g1")
         self._ended = threading.Event()

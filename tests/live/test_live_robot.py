@@ -62,6 +62,16 @@ def test_lease_interventions_questions_and_an_operator(tmp_path: Path) -> None:
     assert "minimal-risk" in result.levels
 
 
+def test_an_operator_of_a_supervisor_that_waits_is_told(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with supervisor(tmp_path, endpoint), Robot(endpoint, streaming=False) as robot:
+        request = b'{"who": "jane", "why": "gripper seen to"}'
+        refused = until(lambda: robot.ask("reset", request), "an answer")
+        assert refused == b"error nothing is latched yet: waiting for robot/left_gripper/state"
+        robot.streaming = True
+        until(robot.guard.permitted, "the robot may move")
+
+
 def test_garbage_of_every_kind_is_counted_and_stops_nothing(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     codec = Codec()

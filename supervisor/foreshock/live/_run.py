@@ -135,6 +135,7 @@ class LiveSupervisor:
         if self._missing:
             self._missing = self._silent()
             if self._missing:
+                self._services.refuse_resets(f"nothing is latched yet: waiting for {', '.join(self._missing)}")
                 self._answer()
                 return None
             self.supervisor.reset(0, now_ns)

@@ -84,6 +84,13 @@ class Services:
                 yield record
             query.drop()
 
+    def refuse_resets(self, why: str) -> None:
+        """Tell operators that there is nothing to reset."""
+        for query in _taken(self._asked["reset"]):
+            with suppress(self._lost):
+                query.reply_err(why.encode())
+            query.drop()
+
     def answer(
         self,
         status: Callable[[], Status],
