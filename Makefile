@@ -27,7 +27,6 @@ check: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m tests.docs.generated --check
-	$(BIN)/pytest tests/docs
 
 docs: $(STAMP)
 	$(BIN)/python -m tests.docs.generated
