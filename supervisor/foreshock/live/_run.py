@@ -255,7 +255,7 @@ class LiveSupervisor:
         if not settings.folder:
             return None
         robot = self._run.config.supervisor.robot
-        return SegmentedJournal(base / settings.folder, robot, self.epoch, head, settings, self.epoch / NS_PER_S)
+        return SegmentedJournal(base / settings.folder, robot, self.epoch, head, settings, wall_ns() / NS_PER_S)
 
 
 def _channels(run: RunConfig, supervisor: Supervisor) -> dict[str, type]:
