@@ -4,7 +4,7 @@ from foreshock.recording._format import DECISION, END, RESET, TICK, End, Head, T
 from foreshock.recording._read import JournalFile, Tick, is_journal
 from foreshock.recording._records import DamagedError, Records
 from foreshock.recording._recover import Summary, recover, summary
-from foreshock.recording._write import McapJournal
+from foreshock.recording._write import McapJournal, check_writable
 
 __all__ = [
     "DECISION",
@@ -20,6 +20,7 @@ __all__ = [
     "Summary",
     "Tick",
     "TickRecord",
+    "check_writable",
     "is_journal",
     "recover",
     "summary",

@@ -35,7 +35,7 @@ from foreshock.recording._format import (
 from foreshock.records import Decision, Sample
 from foreshock.wire import ROS_NAMES, Codec, encode_reference, typestore
 
-__all__ = ["McapJournal"]
+__all__ = ["McapJournal", "check_writable"]
 
 CHUNK_BYTES = 16_384
 
@@ -161,6 +161,16 @@ class McapJournal:
             topic, "json", self._writer.register_schema(cls.__name__, "jsonschema", schema)
         )
         return found
+
+
+def check_writable(path: Path) -> None:
+    """Whether a journal can be made here later; its folder is made now.
+
+    Raises:
+        BadInputError: it cannot.
+    """
+    _created(path).close()
+    path.unlink()
 
 
 def _created(path: Path) -> BinaryIO:
