@@ -93,7 +93,7 @@ def _bag(file: Path, config: Path, report: Path | None, as_json: bool) -> int:
             from foreshock.report.statistics import write_statistics
         except ImportError as e:
             raise BadInputError("--report", f"needs {e.name}", "; run: pip install 'foreshock[report]'") from e
-        write_statistics(report, f"{file} under {config}", result.series, _notes(result))
+        write_statistics(report, f"{file} under {config}", result.series, result.units, _notes(result))
     if as_json:
         emit(msgspec.structs.replace(result, series={}))
         return OK
