@@ -18,10 +18,11 @@ from robot import Robot, free_endpoint, supervisor, until
 pytest.importorskip("zenoh")
 
 
-def test_the_journal_of_a_killed_supervisor_replays(tmp_path: Path) -> None:
+@pytest.mark.parametrize("after", range(20, 420, 20) if os.environ.get("FORESHOCK_SOAK") else [100])
+def test_the_journal_of_a_killed_supervisor_replays(tmp_path: Path, after: int) -> None:
     endpoint = free_endpoint()
     with supervisor(tmp_path, endpoint) as process, Robot(endpoint) as robot:
-        told = until(lambda: (s := robot.status()) and s.tick > 100 and s.tick, "a hundred ticks")
+        told = until(lambda: (s := robot.status()) and s.tick > after and s.tick, f"{after} ticks")
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
     (journal,) = (tmp_path / "journals").glob("*.mcap")
