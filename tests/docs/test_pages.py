@@ -24,6 +24,7 @@ FILES = {
     "campaigns.md": {'id = "my-campaign"': ["my-campaign.toml"]},
     "whole-body.md": {'id = "beside-a-human"': ["beside-a-human.toml"]},
     "README.md": {"[supervisor]": ["robot.toml"]},
+    "journal.md": {"[supervisor]": ["robot.toml"]},
 }
 """What a page tells its reader to save, by page and first line of the block."""
 

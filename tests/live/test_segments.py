@@ -52,6 +52,38 @@ def test_a_new_file_begins_in_time_and_only_the_first_is_compared(tmp_path: Path
     assert sum(replay(f, config=parse_config(CONFIG, "config")).ticks for f in files) == 70
 
 
+def test_a_run_of_months_removes_what_grew_old_meanwhile(tmp_path: Path) -> None:
+    began_s, day_s = NOW_S - 60 * 86400.0, 86400.0
+    supervisor = Supervisor(parse_config(CONFIG, "config"))
+    # the supervisor's timeline begins anywhere
+    began_ns = 5_000_000_000_000
+    settings = JournalSettings(max_age_s=30 * day_s)
+    journal = SegmentedJournal(tmp_path, "r", 2, Head(CONFIG, "", 0, began_ns), settings, began_s)
+    supervisor.reset(0, began_ns)
+    first, before = journal.path, tmp_path / "r-1-00000.mcap"
+    before.write_bytes(bytes(400_000))
+    os.utime(before, (NOW_S - 61 * day_s,) * 2)
+
+    def tick(day: float) -> Path:
+        now_ns = began_ns + round(day * day_s * 1e9)
+        journal.tick([], supervisor.step([], now_ns))
+        return journal.path
+
+    assert tick(20.0) != first
+    assert before.exists()
+    os.utime(first, (began_s + 20 * day_s,) * 2)
+    second = tick(40.0)
+    assert not before.exists(), "it is 41 days old"
+    assert first.exists(), "it was written 20 days ago"
+    os.utime(second, (began_s + 40 * day_s,) * 2)
+    last = tick(60.0)
+    assert not first.exists(), "it was written 40 days ago"
+    assert second.exists()
+    journal.close()
+    supervisor.close()
+    assert last.exists()
+
+
 def test_the_oldest_are_removed_by_age_and_by_size(tmp_path: Path) -> None:
     others = [tmp_path / "bag.mcap", tmp_path / "r-arm-1-00000.mcap", tmp_path / "r-notes.mcap"]
     for other in others:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from rich.markup import escape
 
 from foreshock.cli.output import OK, console, emit, table
-from foreshock.errors import BadInputError
 from foreshock.recording import JournalFile, recover, summary
 
 __all__ = ["journal"]
@@ -34,6 +34,8 @@ def info(file: Path, as_json: bool) -> int:
     head = JournalFile(file).head
     console.print(f"Foreshock {head.foreshock}, Python {head.python}, seed {head.seed}", markup=False)
     console.print(f"digest {found.digest}")
+    if found.left_out:
+        console.print(f"[yellow]recovered: {escape(found.left_out)}[/]", soft_wrap=True)
     if not found.complete:
         console.print("[yellow]not closed: its writer was killed, or still writes; see foreshock journal recover[/]")
     return OK
@@ -44,12 +46,15 @@ def info(file: Path, as_json: bool) -> int:
 @click.argument("out", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def recover_command(file: Path, out: Path, as_json: bool) -> int:
-    """Copy every whole tick of a torn FILE to OUT, with an index, so that any reader of MCAP opens it."""
-    if out.exists():
-        raise BadInputError("OUT", f"{out} exists; nothing is overwritten")
+    """Copy every whole tick of a torn or damaged FILE to OUT, with an index, so that any reader of MCAP opens it.
+
+    It ends before the first damage, and says where that is and how much is left out; exit code 0 then, too.
+    """
     found = recover(file, out)
     if as_json:
         emit(found)
     else:
         console.print(f"{found.ticks} ticks, {sum(found.messages.values())} messages: {out}", markup=False)
+        if found.left_out:
+            console.print(f"[yellow]{escape(found.left_out)}[/]", soft_wrap=True)
     return OK

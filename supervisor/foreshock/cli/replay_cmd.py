@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 import msgspec
+from rich.markup import escape
 from rich.progress import Progress
 
 from foreshock._strict import read_toml
@@ -33,7 +34,7 @@ def replay(file: Path, config: Path | None, report: Path | None, as_json: bool) 
     """Make the decisions of a journal FILE again and compare their digests, or run a ROS 2 bag through a supervisor.
 
     A bag (MCAP or SQLite) needs --config; its table [topics] maps topics to channels below the robot's. Exit code 1
-    if samples of a journal were altered or a decision differs; with --config decisions may differ, samples must not.
+    if a journal was altered or a decision differs; with --config decisions may differ.
     """
     if not is_journal(file):
         if config is None:
@@ -69,16 +70,16 @@ def _configuration(path: Path) -> tuple[Config, dict[str, str]]:
 def _print(result: Replay, config: Path | None) -> None:
     rows = [(name, str(count)) for name, count in result.levels.items()]
     table(f"{result.journal}: {result.ticks} ticks in {result.seconds:.1f} s", "level", "ticks", rows=rows)
-    if not result.complete:
-        console.print("[yellow]the file was not closed: what is there was replayed[/]")
+    if result.warning:
+        console.print(f"[yellow]{escape(result.warning)}[/]")
     if result.altered_at is not None:
-        console.print(f"[red]samples of tick {result.altered_at} or before are not those that were recorded[/]")
+        console.print(f"[red]altered, at tick {result.altered_at}: {escape(result.altered)}[/]")
     if result.foreign:
         said = "the same as" if result.differs_at is None else f"not those, from tick {result.differs_at} on, of"
         console.print(f"decisions with {config} are {said} the recorded configuration", markup=False)
     elif result.differs_at is not None:
         console.print(f"[red]decisions differ from tick {result.differs_at} on[/]")
-    else:
+    elif result.altered_at is None:
         console.print(f"[green]decisions agree[/]: {result.replayed}")
 
 
@@ -92,7 +93,7 @@ def _bag(file: Path, config: Path, report: Path | None, as_json: bool) -> int:
             from foreshock.report.statistics import write_statistics
         except ImportError as e:
             raise BadInputError("--report", f"needs {e.name}", "; run: pip install 'foreshock[report]'") from e
-        write_statistics(report, f"{file} under {config}", result.series, _notes(result))
+        write_statistics(report, f"{file} under {config}", result.series, result.units, _notes(result))
     if as_json:
         emit(msgspec.structs.replace(result, series={}))
         return OK

@@ -7,8 +7,9 @@ import threading
 from pathlib import Path
 
 import click
+from rich.markup import escape
 
-from foreshock.cli.output import OK, console, emit, notes
+from foreshock.cli.output import NEGATIVE, OK, console, emit, notes
 from foreshock.errors import BadInputError
 from foreshock.live import LiveSupervisor, load_run, watch_log
 from foreshock.records import Decision, ProtectionLevel
@@ -25,18 +26,21 @@ def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool
     """Supervise a robot live over Zenoh, as CONFIG says, until SIGINT or SIGTERM.
 
     It takes the robot's streams, and publishes decisions, interventions, health and the motion lease; watch it with
-    foreshock top.
+    foreshock top. Exit code 1 if its journal could not be written to the end: it grants no lease from then on.
     """
     if journal is not None and journal.exists():
         raise BadInputError("--journal", f"{journal} exists; a journal is never overwritten", "; choose another name")
     loaded = load_run(config)
     live = LiveSupervisor(loaded, config.parent, journal=journal, denied=watch_log(loaded.link))
     stop = threading.Event()
-    last = ProtectionLevel.NORMAL
+    last, told = ProtectionLevel.NORMAL, False
     timer = threading.Timer(seconds, stop.set) if seconds is not None else None
 
     def ticked(decision: Decision) -> None:
-        nonlocal last
+        nonlocal last, told
+        if live.unrecorded and not told:
+            told = True
+            notes.print(f"[bold red]no lease from now on:[/] {escape(live.unrecorded)}", soft_wrap=True)
         if decision.level is not last:
             modes = ", ".join(m for m, level in decision.levels.items() if level)
             said = f"level {decision.level.name.lower().replace('_', '-')} {modes}".rstrip()
@@ -61,4 +65,4 @@ def run(config: Path, seconds: float | None, journal: Path | None, as_json: bool
     else:
         median, p99, most = final.tick_ms
         console.print(f"{final.tick + 1} ticks, {median:.2f} ms median, {p99:.2f} ms p99, {most:.2f} ms at most")
-    return OK
+    return NEGATIVE if live.unrecorded else OK

@@ -1,4 +1,4 @@
-"""A run's file: a supervisor's configuration with the tables [link], [live] and [journal]."""
+"""A run's file: a supervisor's configuration with the tables [link], [live] and [journal]; [topics] is for bags."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def parse_run(data: dict[str, Any], place: str) -> RunConfig:
     mine: dict[str, Any] = {
         name: convert(data[name], cls, f"{place}: {name}") for name, cls in TABLES.items() if name in data
     }
-    tables = {name: value for name, value in data.items() if name not in TABLES}
+    tables = {name: value for name, value in data.items() if name not in TABLES and name != "topics"}
     return RunConfig(parse_config(tables, place), tables, **mine)
 
 

@@ -31,18 +31,18 @@ class SegmentedJournal:
         epoch: of the supervisor, so that the files of two runs never meet.
         head: what a replay needs.
         settings: when a new segment begins, and what is kept.
-        today_s: age of the oldest file that is kept is counted from here (s since 1970).
+        today_s: when the run began (s since 1970): a file's age is counted from here, and the time that has passed.
     """
 
     def __init__(
         self, folder: Path, robot: str, epoch: int, head: Head, settings: JournalSettings, today_s: float
     ) -> None:
         self._folder, self._robot, self._stem = folder, robot, f"{robot}-{epoch}"
-        self._head, self._settings = head, settings
+        self._head, self._settings, self._began_ns = head, settings, head.began_ns
         self._today_s = today_s
         self._segment = 0
         self._begun_ns = head.began_ns
-        self._open()
+        self._open(head.began_ns)
 
     @property
     def path(self) -> Path:
@@ -56,7 +56,7 @@ class SegmentedJournal:
             self._segment += 1
             self._begun_ns = decision.now_ns
             self._head = msgspec.structs.replace(self._head, segment=self._segment)
-            self._open()
+            self._open(decision.now_ns)
         self._file.tick(samples, decision, verdicts)
 
     def operator_reset(self, record: OperatorReset) -> None:
@@ -67,11 +67,11 @@ class SegmentedJournal:
         """Close the file; idempotent."""
         self._file.close()
 
-    def _open(self) -> None:
+    def _open(self, now_ns: int) -> None:
         self._file = McapJournal(self._folder / f"{self._stem}-{self._segment:05d}.mcap", self._head)
-        self._retain()
+        self._retain(self._today_s + (now_ns - self._began_ns) / 1e9)
 
-    def _retain(self) -> None:
+    def _retain(self, today_s: float) -> None:
         """Remove the oldest files beyond size and age, never the one that is written."""
         found: list[tuple[float, Path, int]] = []
         # of this robot's live runs only: whatever else lies in the folder is somebody's
@@ -84,7 +84,7 @@ class SegmentedJournal:
         for modified_s, path, size in sorted(found):
             if path == self._file.path:
                 continue
-            if self._today_s - modified_s <= self._settings.max_age_s and total <= self._settings.max_bytes:
+            if today_s - modified_s <= self._settings.max_age_s and total <= self._settings.max_bytes:
                 return
             total -= size
             path.unlink(missing_ok=True)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, cast
 
@@ -26,7 +27,7 @@ from foreshock.live._robot import RobotLink
 from foreshock.live._services import Services
 from foreshock.live._status import Status, TickTimes, stream_status
 from foreshock.live._stream import Stream
-from foreshock.recording import Head, McapJournal
+from foreshock.recording import Head, McapJournal, check_writable
 from foreshock.records import Decision, ProtectionLevel
 from foreshock.registry import Registry
 from foreshock.supervisor import Supervisor
@@ -40,6 +41,9 @@ BY_NAME = {cls.__name__: cls for cls in ROS_NAMES}
 class LiveSupervisor:
     """Runs until it is told to stop.
 
+    Attributes:
+        unrecorded: why the journal cannot be written any more; no lease is granted then. Empty while all is well.
+
     Args:
         run: what to run.
         base: folder that relative paths of the configuration start from.
@@ -48,7 +52,7 @@ class LiveSupervisor:
         denied: who was turned away, if somebody watches the log; see watch_log.
 
     Raises:
-        BadInputError: the configuration does not fit, or the link cannot be opened.
+        BadInputError: the configuration does not fit, the link cannot be opened, or the journal cannot be written.
     """
 
     def __init__(
@@ -61,6 +65,10 @@ class LiveSupervisor:
     ) -> None:
         base = base or Path()
         self._run, self.epoch = run, wall_ns()
+        if journal is None and run.journal.folder:
+            check_writable(base / run.journal.folder / f"{run.config.supervisor.robot}-{self.epoch}-00000.mcap")
+        elif journal is not None:
+            check_writable(journal)
         self.supervisor = Supervisor(run.config, base, registry, epoch=self.epoch)
         robot = run.config.supervisor.robot
         channels = _channels(run, self.supervisor)
@@ -91,6 +99,7 @@ class LiveSupervisor:
         self._base = base
         self._journal_file = journal
         self._journal: SegmentedJournal | McapJournal | None = None
+        self.unrecorded = ""
         self._needed = self.supervisor.required_channels()
         self._missing = sorted(self._needed) or [s.channel for s in self._streams]
         self._times = TickTimes()
@@ -140,22 +149,25 @@ class LiveSupervisor:
                 return None
             self.supervisor.reset(0, now_ns)
             self._began_ns = now_ns
-            self._journal = self._open_journal()
+            with self._recording():
+                self._journal = self._open_journal()
         for reset in self._services.resets(self.supervisor, now_ns):
             self._digest.operator_reset(reset)
-            if self._journal is not None:
-                self._journal.operator_reset(reset)
+            with self._recording():
+                if self._journal is not None:
+                    self._journal.operator_reset(reset)
         decision = self.supervisor.step(samples, now_ns)
         self._robot.hear(now_ns)
         self._robot.tell(decision, now_ns)
         self._decision = decision
         self._handshakes.update(self._services.peers(), now_ns)
-        permitted = not (self._robot.overdue(now_ns) or self._handshakes.refused or self._doubted())
+        permitted = not (self._robot.overdue(now_ns) or self._handshakes.refused or self._doubted() or self.unrecorded)
         self._robot.grant(self.supervisor, now_ns, permitted=permitted)
         verdicts = self.supervisor.verdicts_of(decision)
         self._digest.tick(samples, decision, verdicts)
-        if self._journal is not None:
-            self._journal.tick(samples, decision, verdicts)
+        with self._recording():
+            if self._journal is not None:
+                self._journal.tick(samples, decision, verdicts)
         for h in decision.health:
             if h.state == "ok":
                 self._health.pop(h.source, None)
@@ -164,6 +176,14 @@ class LiveSupervisor:
         self._publish(decision, now_ns)
         self._answer()
         return decision
+
+    @contextmanager
+    def _recording(self) -> Iterator[None]:
+        """Around what writes to the journal: where it cannot be written, it ends, and the lease with it."""
+        try:
+            yield
+        except BadInputError as e:
+            self.unrecorded, self._journal = str(e), None
 
     def _doubted(self) -> list[str]:
         """Streams whose clock has just jumped: nobody moves on them, however old their last believed sample may be."""
@@ -188,6 +208,7 @@ class LiveSupervisor:
             withheld = f"the clock of {', '.join(doubted)} has jumped"
         if refused := self._handshakes.refused:
             withheld = "; ".join(f"{twin} is refused: {why}" for twin, why in refused.items())
+        withheld = self.unrecorded or withheld
         if self._missing:
             withheld = f"waiting for {', '.join(self._missing)}"
         faults = {s.channel: f"link: {s.counts.last_fault}" for s in self._streams if s.counts.last_fault}
@@ -230,10 +251,11 @@ class LiveSupervisor:
 
     def close(self) -> None:
         """End the link, the journal and child processes; idempotent."""
-        if self._journal is not None:
-            self._journal.close()
-        self.supervisor.close()
-        self._session.close()
+        with ExitStack() as ends:
+            ends.callback(self._session.close)
+            ends.callback(self.supervisor.close)
+            if self._journal is not None:
+                ends.callback(self._journal.close)
 
     def _publish(self, decision: Decision, now_ns: int) -> None:
         level = (decision.level, *decision.levels.values())
@@ -255,7 +277,7 @@ class LiveSupervisor:
         if not settings.folder:
             return None
         robot = self._run.config.supervisor.robot
-        return SegmentedJournal(base / settings.folder, robot, self.epoch, head, settings, self.epoch / NS_PER_S)
+        return SegmentedJournal(base / settings.folder, robot, self.epoch, head, settings, wall_ns() / NS_PER_S)
 
 
 def _channels(run: RunConfig, supervisor: Supervisor) -> dict[str, type]:

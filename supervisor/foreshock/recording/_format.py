@@ -9,12 +9,27 @@ import msgspec
 
 from foreshock.journal import OperatorReset
 
-__all__ = ["DECISION", "HEAD", "RESET", "TICK", "Head", "SampleNote", "TickRecord", "sample_digest"]
+__all__ = [
+    "DECISION",
+    "END",
+    "HEAD",
+    "RESET",
+    "TICK",
+    "End",
+    "Head",
+    "SampleNote",
+    "TickRecord",
+    "head_digest",
+    "sample_chain",
+    "sample_digest",
+]
 
 HEAD = "foreshock"
 """Name of the metadata record that comes first."""
 TICK, DECISION, RESET = "/foreshock/tick", "/foreshock/decision", "/foreshock/operator_reset"
-VERSION = 1
+END = "/foreshock/end"
+VERSION = 2
+"""1 had no end record."""
 
 
 class Head(msgspec.Struct, frozen=True):
@@ -70,6 +85,34 @@ class TickRecord(msgspec.Struct, frozen=True):
     verdicts: Mapping[str, str]
     decisions: str
     data: str
+
+
+class End(msgspec.Struct, frozen=True):
+    """The last message of a closed file, so that one that was cut short is told from a whole one.
+
+    Attributes:
+        ticks: how many are in the file.
+        decisions: hash chain over all decisions and resets.
+        data: hash chain over all samples, at the last tick.
+        head: SHA-256 of the head, as it is written.
+        left_out: what `journal recover` could not save of the file that this one was made of; empty for a run's own.
+    """
+
+    ticks: int
+    decisions: str
+    data: str
+    head: str
+    left_out: str = ""
+
+
+def head_digest(head: str) -> str:
+    """Of a head, as it is written."""
+    return hashlib.sha256(head.encode()).hexdigest()
+
+
+def sample_chain() -> hashlib._Hash:
+    """The chain over samples, before the first."""
+    return hashlib.sha256(b"foreshock samples 1")
 
 
 def sample_digest(chain: hashlib._Hash, note: SampleNote, payload: bytes) -> None:

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
-from foreshock.errors import BadInputError, MissingExtraError, WireError
+from foreshock.errors import BadInputError, WireError
 from foreshock.journal import OperatorReset
-from foreshock.recording._format import DECISION, HEAD, RESET, TICK, Head, TickRecord, sample_digest
+from foreshock.recording._format import (
+    DECISION,
+    END,
+    HEAD,
+    RESET,
+    TICK,
+    End,
+    Head,
+    TickRecord,
+    head_digest,
+    sample_chain,
+    sample_digest,
+)
+from foreshock.recording._records import DamagedError, Records
 from foreshock.records import Sample
 from foreshock.wire import BY_ROS, Codec
 
-__all__ = ["JournalFile", "Tick", "is_journal", "records_of"]
+__all__ = ["JournalFile", "Tick", "is_journal"]
 
 
 T = TypeVar("T")
@@ -28,44 +41,15 @@ class Tick(msgspec.Struct, frozen=True):
         record: of the tick.
         samples: decoded.
         resets: by operators, before this tick.
-        intact: whether the samples are those that were written.
+        intact: whether the samples are those that were written, under their topics and times.
+        decisions: those that stand before it, as JSON: one, in a file as it was written.
     """
 
     record: TickRecord
     samples: tuple[Sample, ...]
     resets: tuple[OperatorReset, ...]
     intact: bool
-
-
-def records_of(path: Path) -> Iterator[Any]:
-    """MCAP records of the data section, out of their chunks; ends without an error where the file is torn.
-
-    Raises:
-        BadInputError: it is no MCAP file, or not even its beginning is there.
-        MissingExtraError: mcap is not installed.
-    """
-    try:
-        from mcap.exceptions import EndOfFile
-        from mcap.stream_reader import StreamReader
-    except ImportError as e:
-        hint = "; run: pip install 'foreshock[zenoh]'"
-        raise MissingExtraError("journal", f"{e.name} is not installed", hint) from e
-    if not path.is_file():
-        raise BadInputError(str(path), "is no file")
-    with path.open("rb") as file:
-        reader = StreamReader(file, validate_crcs=True)
-        count = 0
-        try:
-            for record in reader.records:
-                count += 1
-                yield record
-        except EndOfFile:
-            if not count:
-                raise BadInputError(str(path), "ends before the first record of an MCAP file") from None
-        except Exception as e:  # noqa: BLE001 # damaged bytes make the reader raise anything
-            raise BadInputError(
-                str(path), f"is no MCAP file, or damaged after record {count}: {type(e).__name__}: {e}"
-            ) from None
+    decisions: tuple[bytes, ...]
 
 
 def is_journal(path: Path) -> bool:
@@ -89,6 +73,11 @@ class JournalFile:
     Attributes:
         path: of the file.
         head: what a replay needs.
+        complete: whether it was closed; this and what follows is known when all ticks were read.
+        end: its end record; None if there is none.
+        resets: by operators, after the last tick.
+        rest: samples and decisions after the last tick, as a closed file never has them.
+        records: of the file, with the number of bytes that could be read.
 
     Args:
         path: of the file.
@@ -98,12 +87,15 @@ class JournalFile:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.complete = False
-        for record in records_of(path):
+        self.path, self.records = path, Records(path)
+        self.complete, self.rest = False, 0
+        self.resets: tuple[OperatorReset, ...] = ()
+        self.end: End | None = None
+        for record in self.records:
             if getattr(record, "name", "") == HEAD and hasattr(record, "metadata"):
                 try:
                     self.head = msgspec.json.decode(record.metadata["head"], type=Head)
+                    self.head_digest = head_digest(record.metadata["head"])
                 except (KeyError, msgspec.MsgspecError) as e:
                     raise BadInputError(str(path), f"its head cannot be read: {e}") from None
                 return
@@ -115,18 +107,19 @@ class JournalFile:
         """Every whole tick.
 
         Raises:
-            BadInputError: the file is damaged in its middle.
+            DamagedError: the file is damaged in its middle.
         """
         from mcap.records import Channel, DataEnd, Message, Schema
 
         schemas: dict[int, str] = {}
         channels: dict[int, tuple[str, str]] = {}
         codec = Codec()
-        data = hashlib.sha256(b"foreshock samples 1")
-        waiting: list[tuple[str, bytes]] = []
+        data = sample_chain()
+        waiting: list[tuple[str, str, Any]] = []
         resets: list[OperatorReset] = []
+        decisions: list[Any] = []
         tick = -1
-        for record in records_of(self.path):
+        for record in self.records:
             if isinstance(record, Schema):
                 schemas[record.id] = record.name
             elif isinstance(record, Channel):
@@ -138,36 +131,46 @@ class JournalFile:
                 if topic == TICK:
                     noted = self._json(record.data, TickRecord, tick)
                     tick = noted.tick
-                    yield self._tick(noted, waiting, resets, data, codec)
-                    waiting, resets = [], []
+                    yield self._tick(noted, waiting, resets, decisions, data, codec)
+                    waiting, resets, decisions = [], [], []
                 elif topic == RESET:
                     resets.append(self._json(record.data, OperatorReset, tick))
-                elif topic != DECISION:
-                    waiting.append((schema, record.data))
+                elif topic == DECISION:
+                    decisions.append(record)
+                elif topic == END:
+                    self.end = self._json(record.data, End, tick)
+                else:
+                    waiting.append((topic, schema, record))
+        self.resets, self.rest = tuple(resets), len(waiting) + len(decisions)
 
     def _json(self, data: bytes, cls: type[T], tick: int) -> T:
         try:
             return msgspec.json.decode(data, type=cls)
         except msgspec.MsgspecError as e:
-            raise BadInputError(str(self.path), f"a {cls.__name__} after tick {tick} cannot be read: {e}") from None
+            raise DamagedError(self.path, f"has a {cls.__name__} after tick {tick} that cannot be read: {e}") from None
 
     def _tick(
         self,
         record: TickRecord,
-        payloads: list[tuple[str, bytes]],
-        resets: list[OperatorReset],
+        given: Sequence[tuple[str, str, Any]],
+        resets: Sequence[OperatorReset],
+        decisions: Sequence[Any],
         data: hashlib._Hash,
         codec: Codec,
     ) -> Tick:
-        if len(payloads) != len(record.samples):
-            said = f"tick {record.tick} names {len(record.samples)} samples, {len(payloads)} are there"
-            raise BadInputError(str(self.path), said)
-        samples = []
-        for note, (schema, payload) in zip(record.samples, payloads, strict=True):
-            sample_digest(data, note, payload)
+        if len(given) != len(record.samples):
+            said = f"has {len(given)} samples of tick {record.tick}, which names {len(record.samples)}"
+            raise DamagedError(self.path, said)
+        samples, log_ns = [], max(record.now_ns, 0)
+        intact = all(d.log_time == log_ns == d.publish_time for d in decisions)
+        for note, (topic, schema, message) in zip(record.samples, given, strict=True):
+            sample_digest(data, note, message.data)
             try:
-                value, _ = codec.decode(BY_ROS[schema], payload)
+                value, _ = codec.decode(BY_ROS[schema], message.data)
             except (WireError, KeyError) as e:
                 raise BadInputError(f"{self.path}: tick {record.tick}: {note.channel}", str(e)) from None
+            intact &= topic == f"/{note.channel}"
+            intact &= (message.log_time, message.publish_time) == (log_ns, max(note.stamp_ns, 0))
             samples.append(Sample(note.stamp_ns, note.channel, value, note.seq, note.received_ns))
-        return Tick(record, tuple(samples), tuple(resets), data.hexdigest() == record.data)
+        intact &= data.hexdigest() == record.data
+        return Tick(record, tuple(samples), tuple(resets), intact, tuple(d.data for d in decisions))

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from foreshock.config import Config
-from foreshock.errors import BadInputError, ConfigError, MissingExtraError, WireError, nearest
+from foreshock.errors import BadInputError, ConfigError, MissingExtraError, nearest
 from foreshock.journal import Journal
 from foreshock.records import Decision, Sample
 from foreshock.registry import Registry
@@ -34,10 +34,11 @@ class BagReplay(msgspec.Struct, frozen=True):
         samples: by channel.
         missing: channels that a detector needs and no topic gave.
         unread: topics that nothing maps to a channel.
-        faults: messages that could not be read, by topic, with the last reason.
+        faults: how many messages could not be read, by topic, with the last reason.
         levels: ticks at each protection level.
         first_s: when each precursor kind was first present, from the first message.
         series: columns over time: ``t_s``, trust, and of each kind and subject its statistic and threshold.
+        units: of both, by kind and subject.
     """
 
     bag: str
@@ -50,6 +51,7 @@ class BagReplay(msgspec.Struct, frozen=True):
     levels: dict[str, int]
     first_s: dict[str, float]
     series: dict[str, list[float]]
+    units: dict[str, str]
 
 
 def replay_bag(
@@ -73,7 +75,7 @@ def replay_bag(
         done: told of each decision.
 
     Raises:
-        BadInputError: no bag, or no topic of it is a channel that a detector reads.
+        BadInputError: no bag, or a broken one, or no topic of it is a channel that a detector reads.
         MissingExtraError: rosbags is not installed.
     """
     supervisor = Supervisor(config, base, registry)
@@ -121,7 +123,17 @@ def replay_bag(
     missing = tuple(sorted(supervisor.required_channels() - set(counts)))
     seconds = (last_ns - began) / 1e9
     return BagReplay(
-        str(path), ticks, seconds, counts, missing, reader.unread, reader.faults, levels, log.first_s, log.columns
+        str(path),
+        ticks,
+        seconds,
+        counts,
+        missing,
+        reader.unread,
+        reader.faults(),
+        levels,
+        log.first_s,
+        log.columns,
+        log.units,
     )
 
 
@@ -130,15 +142,16 @@ class _Reader:
 
     def __init__(self, path: Path, channels: Mapping[str, str], robot: str) -> None:
         try:
-            from rosbags.highlevel import AnyReader, AnyReaderError
+            from rosbags.highlevel import AnyReader
         except ImportError as e:
             hint = "; run: pip install 'foreshock[zenoh]'"
             raise MissingExtraError("replay", f"{e.name} is not installed", hint) from e
         try:
             self._reader = AnyReader([path], default_typestore=typestore())
             self._reader.open()
-        except (AnyReaderError, OSError, ValueError) as e:
-            raise BadInputError(str(path), f"is no bag that can be read: {e}") from None
+        except Exception as e:  # noqa: BLE001 # a broken file makes the readers of MCAP, SQLite and YAML raise anything
+            raise BadInputError(str(path), f"is no bag that can be read: {_said(e)}") from None
+        self._path = path
         self.topics = tuple(sorted({c.topic for c in self._reader.connections}))
         for topic in channels:
             if topic not in self.topics:
@@ -153,27 +166,48 @@ class _Reader:
             else:
                 unread.append(f"{c.topic} ({c.msgtype})")
         self.unread = tuple(sorted(unread))
-        self.faults: dict[str, str] = {}
+        self._numbers = dict.fromkeys(self._channels, 0)
+        self._faults: dict[str, tuple[int, str]] = {}
+
+    def faults(self) -> dict[str, str]:
+        """How many messages could not be read, by topic, with the last reason."""
+        return {t: f"{n} of {self._numbers[t]} cannot be read; {why}" for t, (n, why) in self._faults.items()}
 
     def samples(self) -> Iterator[Sample]:
-        """All that can be read; what cannot is noted."""
-        numbers = dict.fromkeys(self._channels, 0)
+        """All that can be read; what cannot is noted.
+
+        Raises:
+            BadInputError: the bag itself is broken.
+        """
+        numbers = self._numbers
         try:
-            chosen = [c for c in self._reader.connections if c.topic in self._channels]
-            # no connection at all would mean every one to rosbags
-            for connection, received_ns, raw in self._reader.messages(chosen) if chosen else ():
+            for connection, received_ns, raw in self._messages():
                 topic = connection.topic
                 numbers[topic] += 1
                 try:
                     ros: Any = self._reader.deserialize(raw, connection.msgtype)
                     value, stamp_ns = message_of(connection.msgtype, ros), stamp_of(ros)
-                except (WireError, ValueError, AssertionError, KeyError) as e:
-                    self.faults[topic] = f"message {numbers[topic]}: {type(e).__name__}: {e}"
+                except Exception as e:  # noqa: BLE001 # bytes of a stranger make the decoder raise anything
+                    count = self._faults.get(topic, (0, ""))[0] + 1
+                    self._faults[topic] = (count, f"message {numbers[topic]}: {_said(e)}")
                     continue
                 at_ns = received_ns if stamp_ns is None or stamp_ns == 0 else stamp_ns
                 yield Sample(at_ns, self._channels[topic], value, numbers[topic], received_ns)
         finally:
             self._reader.close()
+
+    def _messages(self) -> Iterator[tuple[Any, int, bytes]]:
+        chosen = [c for c in self._reader.connections if c.topic in self._channels]
+        try:
+            # no connection at all would mean every one to rosbags
+            yield from self._reader.messages(chosen) if chosen else ()
+        except Exception as e:  # noqa: BLE001 # as where it is opened
+            said = f"is broken after {sum(self._numbers.values())} messages: {_said(e)}"
+            raise BadInputError(str(self._path), said) from None
+
+
+def _said(e: Exception) -> str:
+    return f"{type(e).__name__}: {' '.join(str(e).split())}"
 
 
 class _Series:
@@ -182,6 +216,7 @@ class _Series:
     def __init__(self) -> None:
         self.columns: dict[str, list[float]] = {"t_s": []}
         self.first_s: dict[str, float] = {}
+        self.units: dict[str, str] = {}
 
     def add(self, t_s: float, d: Decision) -> None:
         """Take a tick."""
@@ -190,6 +225,7 @@ class _Series:
             name = f"{i.kind}@{i.subject}" if i.subject else i.kind
             row[f"stat:{name}"], row[f"threshold:{name}"] = i.statistic, i.threshold
             row[f"present:{name}"] = float(i.present)
+            self.units[name] = i.unit
             if i.present:
                 self.first_s.setdefault(i.kind, t_s)
         n = len(self.columns["t_s"])
