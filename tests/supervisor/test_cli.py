@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from tests.rogues.plugins.entry_points import install
 
+from foreshock.cli.output import table
+
 GOOD = """
 [[detectors]]
 use = "telemetry"
@@ -125,6 +127,12 @@ def test_no_policies_is_a_warning(tmp_path: Path) -> None:
     assert "policies is empty" in warning
     file.write_text(GOOD)
     assert foreshock("config", "check", str(file)).stderr == ""
+
+
+def test_a_title_longer_than_its_table_stays_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    title = f"{'/a/long/path' * 20}/[1].mcap: 7 ticks, 0.1 s"
+    table(title, "topic", rows=[("x",)])
+    assert capsys.readouterr().out.splitlines()[0] == title
 
 
 @pytest.mark.parametrize("words", [("taxonomy", "show"), ("config", "schema"), ("scenarios", "list")])
