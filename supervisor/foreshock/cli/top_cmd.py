@@ -9,10 +9,11 @@ import click
 import msgspec
 from rich.live import Live
 
+from foreshock.cli._link import Joining, join_options
 from foreshock.cli._top_view import view
 from foreshock.cli.output import OK, console, emit
 from foreshock.errors import BadInputError
-from foreshock.link import DEFAULT_ENDPOINT, LinkSettings, TlsSettings, keys_of, open_link
+from foreshock.link import keys_of, open_link
 from foreshock.live import Status
 
 __all__ = ["ask", "top"]
@@ -36,15 +37,12 @@ def ask(session: Any, key: str, payload: bytes = b"", timeout_s: float = 2.0) ->
 
 @click.command()
 @click.argument("robot", default="talos")
-@click.option("--connect", default=DEFAULT_ENDPOINT, show_default=True, help="Endpoint of the supervisor.")
-@click.option("--ca", default="", help="Certificate authority (PEM), for tls/ endpoints.")
-@click.option("--certificate", default="", help="Of this viewer (PEM).")
-@click.option("--key", default="", help="Its private key (PEM).")
+@join_options("this viewer")
 @click.option("--once", is_flag=True, help="Print one view and end.")
 @click.option("--json", "as_json", is_flag=True, help="Print the status once, as JSON.")
-def top(robot: str, connect: str, ca: str, certificate: str, key: str, once: bool, as_json: bool) -> int:
+def top(robot: str, join: Joining, once: bool, as_json: bool) -> int:
     """Watch the supervisor of ROBOT: trust, precursors, risk by mode, interventions, channel ages, tick times."""
-    link = LinkSettings("client", (), (connect,), tls=TlsSettings(ca, certificate, key))
+    link = join.settings("client")
     session: Any = open_link(link)
     where = keys_of(link, robot).service("status")
     try:
