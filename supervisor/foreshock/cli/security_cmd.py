@@ -35,6 +35,7 @@ def _twins(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dic
 @click.option(
     "--twin", "twins", multiple=True, callback=_twins, metavar="NAME=CHANNEL[,…]", help="A twin, and what it may write."
 )
+@click.option("--host", "hosts", multiple=True, help="Where the supervisor is dialled, if not on this machine alone.")
 @click.option(
     "--naming",
     type=click.Choice(get_args(Naming)),
@@ -47,7 +48,13 @@ def _twins(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dic
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def init(
-    folder: Path, robot: str, twins: dict[str, tuple[str, ...]], naming: Naming, domain: int, as_json: bool
+    folder: Path,
+    robot: str,
+    twins: dict[str, tuple[str, ...]],
+    hosts: tuple[str, ...],
+    naming: Naming,
+    domain: int,
+    as_json: bool,
 ) -> int:
     """Make a development authority in FOLDER, certificates for everybody, and link.toml with the access rules.
 
@@ -55,7 +62,7 @@ def init(
     certificate and key of their own name: only the supervisor can write interventions and the lease, a twin its own
     channels only, and only an operator can reset a latch.
     """
-    files = init_security(folder, robot, twins, naming=naming, domain=domain)
+    files = init_security(folder, robot, twins, hosts, naming, domain)
     if as_json:
         emit([str(f) for f in files])
     else:

@@ -20,7 +20,7 @@ SUPERVISOR, OPERATOR, VIEWER = "supervisor", "operator", "viewer"
 QUESTIONS = ("status", "taxonomy", "config", "history")
 AUTHORITY = "ca"
 MOST_NAME = 64
-HOSTS = ("localhost", "127.0.0.1", "::1")
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
 def access_rules(
@@ -60,15 +60,24 @@ def init_security(
     folder: Path,
     robot: str,
     twins: Mapping[str, Sequence[str]],
-    hosts: Sequence[str] = HOSTS,
+    hosts: Sequence[str] = (),
     naming: Naming = "foreshock",
     domain: int = 0,
 ) -> list[Path]:
     """Write authority, certificates, keys, and link.toml for the supervisor; the files.
 
+    Args:
+        folder: new or empty.
+        robot: see access_rules.
+        twins: see access_rules.
+        hosts: names and addresses at which the supervisor is dialled, beside this machine's loopback. No other
+            certificate has them, so that nobody else passes for the supervisor there.
+        naming: see access_rules.
+        domain: see access_rules.
+
     Raises:
-        BadInputError: the folder holds something already, a name is used twice or is no plain file name, or a twin's
-            channel is no key expression; nothing is written then.
+        BadInputError: the folder holds something already, a name is used twice or is no plain file name, a host is
+            none, or a twin's channel is no key expression; nothing is written then.
         MissingExtraError: trustme or eclipse-zenoh is not installed.
     """
     try:
@@ -90,16 +99,20 @@ def init_security(
                 raise ConfigError(f"twin {rule.name}", problem, hint) from None
     if folder.exists() and any(folder.iterdir()):
         raise BadInputError(str(folder), "is not empty; certificates are never overwritten")
-    folder.mkdir(parents=True, exist_ok=True)
     authority = trustme.CA(organization_name="Foreshock development")
+    issued = {name: authority.issue_cert(*LOOPBACK, common_name=name) for name in names}
+    try:
+        issued[SUPERVISOR] = authority.issue_cert(*LOOPBACK, *hosts, common_name=SUPERVISOR)
+    except ValueError as e:
+        raise ConfigError("host", f"{', '.join(map(repr, hosts))}: {e}") from None
+    folder.mkdir(parents=True, exist_ok=True)
     written = [folder / f"{AUTHORITY}.pem"]
     authority.cert_pem.write_to_path(str(written[0]))
-    for name in names:
-        issued = authority.issue_cert(*hosts, common_name=name)
+    for name, certificate in issued.items():
         key, chain = folder / f"{name}.key.pem", folder / f"{name}.pem"
         key.touch(mode=0o600)
-        issued.private_key_pem.write_to_path(str(key))
-        chain.write_bytes(b"".join(blob.bytes() for blob in issued.cert_chain_pems))
+        certificate.private_key_pem.write_to_path(str(key))
+        chain.write_bytes(b"".join(blob.bytes() for blob in certificate.cert_chain_pems))
         written += [chain, key]
     link = {
         "link": {
