@@ -111,10 +111,11 @@ def assert_the_same_over_zenoh(scenario: Scenario, served: str) -> None:
 
 
 class Robot:
-    """Streams a steady grip at 100 Hz while ``streaming``."""
+    """Streams a steady grip every ``period_s`` while ``streaming``."""
 
-    def __init__(self, endpoint: str, streaming: bool = True) -> None:
-        self.link = LinkSettings("peer", (), (endpoint,))
+    def __init__(self, endpoint: str, streaming: bool = True, link: LinkSettings | None = None) -> None:
+        self.link = link or LinkSettings("peer", (), (endpoint,))
+        self.period_s = 0.01
         self.keys = Keys("robot")
         self.interventions: list[Intervention] = []
         self.stops: list[str] = []
@@ -167,7 +168,7 @@ class Robot:
 
     def _stream(self) -> None:
         noise = random.Random(1)  # a sensor that repeats itself to the last bit is frozen
-        while not self._ended.wait(0.01):
+        while not self._ended.wait(self.period_s):
             if self.streaming:
                 grip = GripState(True, 20.0 + noise.gauss(0.0, 0.01), 5.0, 0.05, 20.0, 0.5, 0.0)
                 stamp_ns = time.time_ns() + self.jump_ns

@@ -7,11 +7,13 @@ import sys
 import time
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
+import tomli_w
 
 sys.path.append(str(Path(__file__).parents[1] / "live"))
 from robot import free_endpoint, supervisor, until
@@ -19,11 +21,11 @@ from robot import free_endpoint, supervisor, until
 from foreshock.errors import BadInputError
 from foreshock.guard import Guard
 from foreshock.guard._cdr import Numbered, Request, pack_intervention, pack_lease, pack_request
-from foreshock.link import LinkSettings, TlsSettings, open_link
+from foreshock.link import LinkSettings, TlsSettings, open_link, ros_tokens
 from foreshock.live import Status, init_security
 from foreshock.messages import GripState
 from foreshock.records import Intervention, Lease
-from foreshock.wire import Codec, Keys, pack_attachment
+from foreshock.wire import Codec, Keys, Naming, pack_attachment
 
 pytest.importorskip("zenoh")
 KEYS = Keys("robot")
@@ -66,22 +68,31 @@ def _opened(link: LinkSettings) -> Any:
         return None
 
 
-@pytest.fixture(scope="module")
-def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
-    folder = tmp_path_factory.mktemp("certificates") / "here"
-    init_security(folder, "robot", {"scene": ["humans/pose"]})
+@contextmanager
+def a_plant(folder: Path, naming: Naming = "foreshock", domain: int = 0) -> Iterator[Plant]:
+    """A supervisor with the rules that ``security init`` writes, but for a peer ``stranger``, whom none names."""
+    init_security(
+        folder, "robot", {"scene": ["humans/pose"], "stranger": ["humans/pose"]}, naming=naming, domain=domain
+    )
     endpoint = free_endpoint().replace("tcp/", "tls/")
     link = tomllib.loads((folder / "link.toml").read_text())["link"]
-    text = (folder / "link.toml").read_text().replace(link["listen"][0], endpoint).replace("{", "{{").replace("}", "}}")
+    link |= {"listen": [endpoint], "access": [r for r in link["access"] if r["name"] != "stranger"]}
+    text = tomli_w.dumps({"link": link}).replace("{", "{{").replace("}", "}}")
     with supervisor(folder, endpoint, CONFIG + text):
         yield Plant(folder, endpoint)
 
 
-def stream(session: Any, k: int) -> None:
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Plant]:
+    with a_plant(tmp_path_factory.mktemp("certificates") / "here") as plant:
+        yield plant
+
+
+def stream(session: Any, k: int, keys: Keys = KEYS) -> None:
     """One sample of the gripper."""
     stamp_ns = time.time_ns()
     payload = Codec().encode(GripState(True, 20.0 + 1e-3 * (k % 7), 5.0, 0.05, 20.0, 0.5, 0.0), stamp_ns)
-    key = KEYS.stream("robot/left_gripper/state", "foreshock_msgs/msg/GripState")
+    key = keys.stream("robot/left_gripper/state", "foreshock_msgs/msg/GripState")
     session.put(key, payload, attachment=pack_attachment(k, stamp_ns, b"0123456789abcdef"))
 
 
@@ -147,13 +158,59 @@ def test_a_second_supervisor_is_shown_and_tells_nobody_anything(plant: Plant) ->
             for service in ("lease", "intervention", "decision"):
                 second.put(KEYS.service(service), b"second supervisor")
             token = second.liveliness().declare_token(KEYS.alive("supervisor", "9"))
-            until(lambda: denied(plant, "supervisor", "anything", ""), "no rule names it")
+            for service in ("lease", "intervention", "decision"):
+                until(lambda s=service: denied(plant, "supervisor", "Put", KEYS.service(s)), f"its {service}")
             until(lambda: denied(plant, "supervisor", "Liveliness Token", KEYS.alive("supervisor", "9")), "its token")
             assert "supervisor/9" not in until(lambda: plant.status(viewer), "a status").peers
             token.undeclare()
+            list(second.get(KEYS.service("reset"), payload=b"{}", timeout=1.0))
+            until(lambda: denied(plant, "supervisor", "Query", KEYS.service("reset")), "its question")
+            assert plant.status(second) is not None, "as foreshock doctor does"
         for subscriber in heard:
             while (sample := subscriber.try_recv()) is not None:
                 assert sample.payload.to_bytes() != b"second supervisor"
+
+
+def test_who_is_named_by_no_rule_is_shown_and_writes_nothing(plant: Plant) -> None:
+    with plant.open("viewer") as viewer, plant.open("stranger") as stranger:
+        before = samples(plant, viewer)
+        stream(stranger, 0)
+        until(lambda: denied(plant, "stranger", "anything", ""), "no rule names it")
+        assert samples(plant, viewer) == before
+        assert plant.status(stranger) is None
+
+
+def test_with_the_naming_of_rmw_zenoh_a_robot_streams_and_nobody_in_its_place(tmp_path: Path) -> None:
+    keys = Keys("robot", "rmw_zenoh", 7)
+    with (
+        a_plant(tmp_path / "here", keys.naming, keys.domain) as plant,
+        plant.open("viewer") as viewer,
+        plant.open("scene") as scene,
+        plant.open("robot") as robot,
+    ):
+        before = samples(plant, viewer)
+        for k in range(20):
+            stream(scene, k, keys)
+            stream(viewer, k, keys)
+            stream(robot, k, Keys("robot", "rmw_zenoh", 8))  # another domain is another plant's
+        key = keys.stream("robot/left_gripper/state", "foreshock_msgs/msg/GripState")
+        for name in ("scene", "viewer"):
+            until(lambda n=name: denied(plant, n, "Put", key), f"{name} is shown")
+        assert samples(plant, viewer) == before
+        numbers = itertools.count(100)
+        until(lambda: stream(robot, next(numbers), keys) or samples(plant, viewer) > before, "they arrive")
+        # its own channel a twin may write, and the robot's node and topics are announced to ROS 2
+        pose = keys.stream("robot/humans/pose", "foreshock_msgs/msg/Humans")
+        with viewer.declare_subscriber(pose) as heard:
+            until(lambda: scene.put(pose, b"x") or heard.try_recv(), "the twin's stream arrives")
+        tokens = ros_tokens(robot, keys, "MP", {"robot/left_gripper/state": "foreshock_msgs/msg/GripState"})
+        zid = str(robot.zid())
+
+        def announced() -> int:
+            found = viewer.liveliness().get(f"@ros2_lv/7/{zid}/**", timeout=1.0)
+            return sum(r.ok is not None for r in found)
+
+        until(lambda: announced() == len(tokens) == 2, "the tokens arrive")
 
 
 def test_no_wildcard_reaches_a_service(plant: Plant) -> None:

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from tests.rogues.plugins.entry_points import install
 
+from foreshock.cli.output import table
+
 GOOD = """
 [[detectors]]
 use = "telemetry"
@@ -72,6 +74,11 @@ def test_bad_input_is_one_error_and_exit_2(words: tuple[str, ...], message: str,
         (GOOD + GOOD, "'telemetry' is listed twice"),
         ("[supervisor]\nperiod_s = 0.01\n", "missing required field `detectors`"),
         (GOOD + "[detectors.channels]\nodometri = 'a/b'\n", "has no such input"),
+        (GOOD + "[link]\nlissten = []\n", "link.lissten: unknown key; did you mean 'listen'"),
+        (GOOD + "[link]\nlisten = ['tcp/0.0.0.0:7447']\n", "link.listen: 'tcp/0.0.0.0:7447' is beyond this machine"),
+        (GOOD + "[live]\nttl_s = 2.0\n", "live.ttl_s: 2.0 is not a finite number"),
+        (GOOD + "[live.streams]\n'imu/state' = 'Imuu'\n", "there is no message 'Imuu'; did you mean 'Imu'"),
+        (GOOD + "[journal]\nmax_byte = 1\n", "max_byte: unknown key; did you mean 'max_bytes'"),
     ],
 )
 def test_a_bad_configuration_names_the_place(text: str, message: str, tmp_path: Path) -> None:
@@ -88,6 +95,16 @@ def test_a_good_configuration_passes(tmp_path: Path) -> None:
     done = foreshock("config", "check", str(file), "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["result"]["detectors"] == ["telemetry"]
+
+
+def test_a_file_that_run_takes_passes(tmp_path: Path) -> None:
+    file = tmp_path / "talos.toml"
+    page = (Path(__file__).parents[2] / "docs" / "live.md").read_text()
+    file.write_text(page.partition("```toml\n")[2].partition("```")[0])
+    assert "[link]" in file.read_text()
+    done = foreshock("config", "check", str(file))
+    assert done.returncode == 0, done.stderr
+    assert "2 detectors (balance, telemetry)" in done.stdout
 
 
 def test_a_wrong_detector_is_answered_with_detectors_only(tmp_path: Path) -> None:
@@ -110,6 +127,12 @@ def test_no_policies_is_a_warning(tmp_path: Path) -> None:
     assert "policies is empty" in warning
     file.write_text(GOOD)
     assert foreshock("config", "check", str(file)).stderr == ""
+
+
+def test_a_title_longer_than_its_table_stays_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    title = f"{'/a/long/path' * 20}/[1].mcap: 7 ticks, 0.1 s"
+    table(title, "topic", rows=[("x",)])
+    assert capsys.readouterr().out.splitlines()[0] == title
 
 
 @pytest.mark.parametrize("words", [("taxonomy", "show"), ("config", "schema"), ("scenarios", "list")])

@@ -8,7 +8,8 @@ import click
 import msgspec
 
 from foreshock.cli.output import console, emit, left_out, warn
-from foreshock.config import config_schema, load_config
+from foreshock.config import config_schema
+from foreshock.live import load_run
 from foreshock.registry import Registry
 from foreshock.session.simulate import warnings_of
 from foreshock.supervisor import Supervisor
@@ -25,8 +26,8 @@ def config() -> None:
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def check(file: Path, as_json: bool) -> None:
-    """Check a configuration: every key, every plugin, every detector's settings."""
-    supervisor = Supervisor(load_config(file), file.parent)
+    """Check a configuration or a run's file: every key, every plugin, every detector's settings."""
+    supervisor = Supervisor(load_run(file).config, file.parent)
     ids = [spec.id for spec in supervisor.detectors]
     supervisor.close()
     warnings = warnings_of(supervisor)
@@ -34,7 +35,7 @@ def check(file: Path, as_json: bool) -> None:
         emit({"file": str(file), "detectors": ids, "config": supervisor.config, "warnings": warnings})
     else:
         warn(warnings)
-        console.print(f"[green]ok[/] {file}: {len(ids)} detectors ({', '.join(ids)})")
+        console.print(f"[green]ok[/] {file}: {len(ids)} detectors ({', '.join(ids)})", soft_wrap=True)
 
 
 @config.command()

@@ -7,19 +7,22 @@ import importlib.util
 import shutil
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import click
 import msgspec
 
+from foreshock.cli._certificates import certificates, common_name
+from foreshock.cli._finding import Finding
 from foreshock.cli.output import NEGATIVE, OK, emit, table
 from foreshock.cli.top_cmd import ask
-from foreshock.clock import NS_PER_S, monotonic_ns, sleep_until, wall_ns
-from foreshock.errors import ForeshockError
+from foreshock.clock import NS_PER_S, monotonic_ns, sleep_until
+from foreshock.errors import BadInputError, ForeshockError
 from foreshock.link import LinkSettings, keys_of, open_link
-from foreshock.live import RunConfig, Status, load_run
+from foreshock.live import RunConfig, Status, StreamCounts, load_run
 from foreshock.registry import Registry
 from foreshock.supervisor import Supervisor
 
@@ -40,14 +43,10 @@ COMPILERS = ("cc", "gcc", "clang")
 
 SILENT_S = 1.0
 """No robot streams more slowly."""
-
-
-class Finding(msgspec.Struct, frozen=True):
-    """One check: what, whether it is fine (None: it does not matter here), and what was found."""
-
-    what: str
-    fine: bool | None
-    found: str
+COUNTED_S = 1.0
+"""Samples are counted for so long, as a detector's least rate is."""
+FAULTS = ("garbage", "foreign", "backwards", "unbelieved")
+"""Samples that do not count; while some come, a stream is not fine."""
 
 
 @click.command()
@@ -56,17 +55,17 @@ class Finding(msgspec.Struct, frozen=True):
 def doctor(config: Path | None, as_json: bool) -> int:
     """Check extras, compiler, plugins and clock; with a run's CONFIG also its detectors, link, certificates and rates.
 
-    Exit code 1 if something that is needed is missing.
+    Exit code 1 if something that is needed is missing, or a supervisor that runs there is not well.
     """
     findings = [*_extras(), _compiler(), _plugins(), _clock()]
     if config is not None:
         run = load_run(config)
-        findings += [*_configured(run, config.parent), *_certificates(run.link, config.parent)]
-        findings += _link(run, config.parent)
+        configured, rates = _configured(run, config.parent)
+        findings += [configured, *certificates(run.link, config.parent), *_link(run, config.parent, rates)]
     if as_json:
         emit(findings)
     else:
-        marks = {True: "ok", False: "MISSING", None: "–"}
+        marks = {True: "ok", False: "NOT OK", None: "–"}
         rows = [(f.what, marks[f.fine], f.found) for f in findings]
         table("Doctor", "what", "state", "found", rows=rows)
     return NEGATIVE if any(f.fine is False for f in findings) else OK
@@ -113,67 +112,97 @@ def _guarded(what: str, check: Callable[[], str]) -> Finding:
         return Finding(what, False, str(e))
 
 
-def _configured(run: RunConfig, base: Path) -> Iterator[Finding]:
+def _configured(run: RunConfig, base: Path) -> tuple[Finding, dict[str, float]]:
+    """Whether the supervisor can be built, and the least rate (Hz) by channel that its detectors need."""
+    rates: dict[str, float] = {}
+
     def build() -> str:
         supervisor = Supervisor(run.config, base)
         try:
+            for i in supervisor.inputs():
+                rates[i.channel] = max(i.min_rate_hz, rates.get(i.channel, 0.0))
             return f"{len(supervisor.detectors)} detectors on {len({c for c, _ in supervisor.channels()})} channels"
         finally:
             supervisor.close()
 
-    yield _guarded("configuration", build)
+    return _guarded("configuration", build), rates
 
 
-def _certificates(link: LinkSettings, base: Path) -> Iterator[Finding]:
-    if not link.tls.ca:
-        remote = link.remote
-        yield Finding("certificates", False if remote else None, "none: anybody on this link may write anything")
-        return
-    from cryptography import x509
-
-    for what, name in (("authority", link.tls.ca), ("certificate", link.tls.certificate)):
-        path = base / name
-        if not path.is_file():
-            yield Finding(what, False, f"there is no file {str(path)!r}; foreshock security init makes one")
-            continue
-        try:
-            certificate = x509.load_pem_x509_certificate(path.read_bytes())
-        except ValueError as e:
-            yield Finding(what, False, f"{path}: {e}")
-            continue
-        left = (certificate.not_valid_after_utc.timestamp() - wall_ns() / NS_PER_S) / 86400.0
-        yield Finding(what, left > 0.0, f"{certificate.subject.rfc4514_string()}, valid for {left:.0f} days")
-
-
-def _link(run: RunConfig, base: Path) -> Iterator[Finding]:
-    """A supervisor that runs there is asked; otherwise its endpoints are tried."""
+def _link(run: RunConfig, base: Path, rates: Mapping[str, float]) -> Iterator[Finding]:
+    """A supervisor that runs there is asked, if it lets us; otherwise its endpoints are tried."""
     link, robot = run.link, run.config.supervisor.robot
-    client = LinkSettings("client", (), link.listen[:1] or link.connect, link.remote, tls=link.tls)
-    try:
-        session: Any = open_link(client, base)
-    except ForeshockError:
+    key = keys_of(link, robot).service("status")
+    where = [e.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:") for e in link.listen[:1]]
+    client = LinkSettings("client", (), tuple(where) or link.connect, link.remote, tls=link.tls)
+    session: Any = None
+    # who asks without a rule for it is shown as turned away
+    if not (unasked := _unasked(link, base, key)):
+        with suppress(ForeshockError):
+            session = open_link(client, base)
+    if session is None:
 
         def listen() -> str:
-            mine: Any = open_link(link, base)
+            try:
+                mine: Any = open_link(link, base)
+            except BadInputError as e:
+                raise BadInputError(e.place, e.problem, f"{e.hint}{unasked}") from None
             mine.close()
             return f"free: {', '.join(link.listen)}"
 
         yield _guarded("link", listen)
         return
     try:
-        keys = keys_of(link, robot)
         began_ns = monotonic_ns()
-        status = msgspec.json.decode(ask(session, keys.service("status")), type=Status)
-        took_ms = (monotonic_ns() - began_ns) / 1e6
-        yield Finding("link", True, f"a supervisor of {robot} answers in {took_ms:.1f} ms")
-        for channel, s in status.streams.items():
-            age = s.source_age_s
-            rate = s.counts.samples / status.uptime_s if status.uptime_s else 0.0
-            said = f"{rate:.0f} a second" + ("" if age is None else f", {age * 1e3:.0f} ms old")
-            silent = s.arrival_age_s is None or s.arrival_age_s > SILENT_S
-            said += f", silent for more than {SILENT_S:g} s" if silent else ""
-            yield Finding(channel, not silent, said + (f"; {s.counts.last_fault}" if s.counts.last_fault else ""))
+        before = msgspec.json.decode(ask(session, key), type=Status)
+        asked_ns = monotonic_ns()
+        yield Finding("link", True, f"a supervisor of {robot} answers in {(asked_ns - began_ns) / 1e6:.1f} ms")
+        sleep_until(asked_ns + round(COUNTED_S * NS_PER_S))
+        status = msgspec.json.decode(ask(session, key), type=Status)
+        yield from _state(before, status, (monotonic_ns() - asked_ns) / NS_PER_S, rates)
     except ForeshockError as e:
         yield Finding("link", False, str(e))
     finally:
         session.close()
+
+
+def _unasked(link: LinkSettings, base: Path, key: str) -> str:
+    """Why the supervisor's certificate may not ask for the status; empty if it may."""
+    if not link.access:
+        return ""
+    try:
+        import zenoh
+    except ImportError:
+        return ""  # opening the link says so
+    try:
+        name = common_name(link, base)
+        mine = [zenoh.KeyExpr(k) for rule in link.access if rule.name == name for k in rule.ask]
+    except (OSError, ValueError, zenoh.ZError) as e:
+        return f"; a supervisor there was not asked: {e}"
+    if any(k.includes(zenoh.KeyExpr(key)) for k in mine):
+        return ""
+    return f"; a supervisor there was not asked: no access rule lets {name!r} ask {key}; add one to [[link.access]]"
+
+
+def _state(before: Status, now: Status, counted_s: float, rates: Mapping[str, float]) -> Iterator[Finding]:
+    """What the supervisor says of itself and of each stream, and the rates between two answers."""
+    yield Finding("motion", not now.withheld, f"withheld: {now.withheld}" if now.withheld else "nothing withholds it")
+    for channel, s in now.streams.items():
+        c = s.counts
+        last = before.streams[channel].counts if channel in before.streams else StreamCounts()
+        n, need = c.samples - last.samples, rates.get(channel, 0.0)
+        said = [
+            f"{n / counted_s:.0f} a second" + ("" if s.source_age_s is None else f", {s.source_age_s * 1e3:.0f} ms old")
+        ]
+        if slow := (n + 1) / counted_s < need:  # one more may have been on its way
+            said.append(f"at least {need:g} are needed")
+        if silent := s.arrival_age_s is None or s.arrival_age_s > SILENT_S:
+            said.append(f"silent for more than {SILENT_S:g} s")
+        counted = {f: getattr(c, f) - getattr(last, f) for f in FAULTS}
+        said += [f"{k} {fault}" for fault, k in counted.items() if k]
+        if c.last_fault:
+            said.append(c.last_fault)
+        yield Finding(channel, not (slow or silent or any(counted.values())), "; ".join(said))
+    for source, why in now.health.items():
+        # a fault of the link stays until the end: whether there are more of them was counted above
+        if source not in now.streams or why != f"link: {now.streams[source].counts.last_fault}":
+            yield Finding(f"health of {source}", False, why)

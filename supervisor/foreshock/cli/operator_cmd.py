@@ -7,10 +7,11 @@ from typing import Any
 import click
 import msgspec
 
+from foreshock.cli._link import Joining, join_options
 from foreshock.cli.output import OK, console, emit
 from foreshock.cli.top_cmd import ask
 from foreshock.journal import OperatorReset
-from foreshock.link import DEFAULT_ENDPOINT, LinkSettings, TlsSettings, keys_of, open_link
+from foreshock.link import keys_of, open_link
 from foreshock.live import ResetRequest
 
 __all__ = ["reset"]
@@ -21,19 +22,14 @@ __all__ = ["reset"]
 @click.option("--who", required=True, help="The operator.")
 @click.option("--why", required=True, help="What was checked.")
 @click.option("--dimension", default="", help="overall, a mode's code or a class's id; all by default.")
-@click.option("--connect", default=DEFAULT_ENDPOINT, show_default=True, help="Endpoint of the supervisor.")
-@click.option("--ca", default="", help="Certificate authority (PEM), for tls/ endpoints.")
-@click.option("--certificate", default="", help="Of the operator (PEM).")
-@click.option("--key", default="", help="Its private key (PEM).")
+@join_options("the operator")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def reset(
-    robot: str, who: str, why: str, dimension: str, connect: str, ca: str, certificate: str, key: str, as_json: bool
-) -> int:
+def reset(robot: str, who: str, why: str, dimension: str, join: Joining, as_json: bool) -> int:
     """Release latched protection levels of ROBOT's supervisor; recorded with who and why.
 
     What still demands protection demands it again in the next tick.
     """
-    link = LinkSettings("client", (), (connect,), tls=TlsSettings(ca, certificate, key))
+    link = join.settings("client")
     session: Any = open_link(link)
     try:
         payload = msgspec.json.encode(ResetRequest(who, why, dimension))

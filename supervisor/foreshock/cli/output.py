@@ -74,8 +74,9 @@ def warn(warnings: Iterable[str]) -> None:
 
 
 def table(title: str, *columns: str, rows: Sequence[tuple[str, ...]], right: tuple[str, ...] = ()) -> None:
-    """Print a table; the columns named in right are aligned to it."""
-    t = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", pad_edge=False)
+    """Print a table below its title, which may be wider; the columns named in right are aligned to it."""
+    console.print(title, style="bold", markup=False, soft_wrap=True)
+    t = Table(header_style="bold", pad_edge=False)
     for c in columns:
         t.add_column(c, justify="right" if c in right else "left", overflow="fold")
     for row in rows:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import click
 
 from foreshock.cli.output import OK, console, emit
 from foreshock.live import init_security
+from foreshock.wire import Naming
 
 __all__ = ["security"]
 
@@ -33,15 +35,34 @@ def _twins(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dic
 @click.option(
     "--twin", "twins", multiple=True, callback=_twins, metavar="NAME=CHANNEL[,…]", help="A twin, and what it may write."
 )
+@click.option("--host", "hosts", multiple=True, help="Where the supervisor is dialled, if not on this machine alone.")
+@click.option(
+    "--naming",
+    type=click.Choice(get_args(Naming)),
+    default="foreshock",
+    show_default=True,
+    help="Key scheme of the streams; rmw_zenoh for ROS 2 robots.",
+)
+@click.option(
+    "--domain", type=click.IntRange(0, 232), default=0, show_default=True, help="ROS domain id, with rmw_zenoh."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def init(folder: Path, robot: str, twins: dict[str, tuple[str, ...]], as_json: bool) -> int:
+def init(
+    folder: Path,
+    robot: str,
+    twins: dict[str, tuple[str, ...]],
+    hosts: tuple[str, ...],
+    naming: Naming,
+    domain: int,
+    as_json: bool,
+) -> int:
     """Make a development authority in FOLDER, certificates for everybody, and link.toml with the access rules.
 
     The supervisor's configuration takes over the tables of link.toml. Everybody else connects with ca.pem and the
     certificate and key of their own name: only the supervisor can write interventions and the lease, a twin its own
     channels only, and only an operator can reset a latch.
     """
-    files = init_security(folder, robot, twins)
+    files = init_security(folder, robot, twins, hosts, naming, domain)
     if as_json:
         emit([str(f) for f in files])
     else:

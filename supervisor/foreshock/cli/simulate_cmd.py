@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import click
 import msgspec
 from rich.markup import escape
 from rich.progress import Progress
 
+from foreshock.cli._link import STEPPED_ENDPOINT, Joining, link_option
 from foreshock.cli.output import OK, console, emit, notes, table, warn
-from foreshock.errors import BadInputError
+from foreshock.errors import BadInputError, ConfigError
 from foreshock.registry import Registry
 from foreshock.session.isolated import Job, run_one
 from foreshock.session.run import Arm, Run
@@ -40,6 +41,7 @@ def values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dic
 @click.option(
     "--twin", help="Kind of twin, or KIND:ENDPOINT; the scenario's variant on it if there is one; its own by default."
 )
+@link_option
 @click.option(
     "--supervisor",
     "arm",
@@ -65,6 +67,7 @@ def values(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dic
 def simulate(
     scenario: str,
     twin: str | None,
+    link: Path | None,
     arm: Arm,
     policy: str | None,
     seed: int | None,
@@ -85,6 +88,8 @@ def simulate(
     if twin is not None and twin != found.twin["kind"]:
         registry.twin(kind, "--twin")
         found = msgspec.structs.replace(found, twin={"kind": kind, **({"endpoint": endpoint} if endpoint else {})})
+    if link is not None or endpoint:
+        found = msgspec.structs.replace(found, twin=_joined(found.twin, Joining(link, endpoint)))
     if duration is not None:
         found = msgspec.structs.replace(found, duration_s=duration)
     if journal is not None and arm == "off":
@@ -111,6 +116,18 @@ def simulate(
         if path is not None:
             console.print(f"{what}: {path}", markup=False)
     return OK
+
+
+def _joined(twin: dict[str, Any], join: Joining) -> dict[str, Any]:
+    """A twin behind Zenoh that is joined as --twin and --link say."""
+    if twin["kind"] != "zenoh":
+        place = "--twin" if join.file is None else "--link"
+        raise BadInputError(place, f"a twin of kind {twin['kind']!r} runs here", "; zenoh:ENDPOINT is one elsewhere")
+    try:
+        link = join.settings("client", twin.get("endpoint", STEPPED_ENDPOINT))
+    except ConfigError as e:
+        raise ConfigError("--twin" if join.file is None else e.place, e.problem, e.hint) from None
+    return {**twin, "endpoint": link.connect[0], "remote": link.remote, "tls": msgspec.to_builtins(link.tls)}
 
 
 def timeline(run: Run, title: str = "") -> None:

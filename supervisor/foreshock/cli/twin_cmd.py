@@ -8,16 +8,15 @@ from pathlib import Path
 
 import click
 
+from foreshock.cli._link import STEPPED_ENDPOINT, Joining, join_options
 from foreshock.cli.output import OK, console, emit, notes
-from foreshock.link import DEFAULT_ENDPOINT, LinkSettings, TlsSettings
+from foreshock.link import DEFAULT_ENDPOINT
 from foreshock.live import FreeRunning, SteppedServer
 from foreshock.registry import Registry
 from foreshock.session.isolated import build_twin
 from foreshock.session.scenario import find_scenario
 
 __all__ = ["twin"]
-
-STEPPED_ENDPOINT = "tcp/127.0.0.1:7448"
 
 
 @click.group()
@@ -29,23 +28,17 @@ def twin() -> None:
 @click.argument("scenario")
 @click.option("--real-time", is_flag=True, help="Run freely on this machine's clock; otherwise it is stepped by query.")
 @click.option("--listen", help=f"Endpoint to be stepped at.  [default: {STEPPED_ENDPOINT}]")
-@click.option("--connect", help=f"Endpoint of the supervisor.  [default with --real-time: {DEFAULT_ENDPOINT}]")
+@join_options("this twin", f"Endpoint of the supervisor.  [default with --real-time: {DEFAULT_ENDPOINT}]")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of a run in real time.")
 @click.option("--seconds", type=click.FloatRange(0.0, min_open=True), help="End after this time; never by default.")
-@click.option("--ca", default="", help="Certificate authority (PEM), for tls/ endpoints.")
-@click.option("--certificate", default="", help="Of this twin (PEM).")
-@click.option("--key", default="", help="Its private key (PEM).")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def serve(
     scenario: str,
     real_time: bool,
     listen: str | None,
-    connect: str | None,
+    join: Joining,
     seed: int,
     seconds: float | None,
-    ca: str,
-    certificate: str,
-    key: str,
     as_json: bool,
 ) -> int:
     """Host the twin of SCENARIO behind Zenoh, until SIGINT or SIGTERM.
@@ -56,7 +49,7 @@ def serve(
     registry = Registry()
     found = find_scenario(scenario, registry)
     robot = found.supervisor().supervisor.robot
-    tls = TlsSettings(ca, certificate, key)
+    link = join.settings("peer") if real_time else join.settings("client", listen=listen or STEPPED_ENDPOINT)
     stop = threading.Event()
     with tempfile.TemporaryDirectory(prefix="foreshock-") as scratch:
         hosted = build_twin(found, registry, Path(scratch))
@@ -66,7 +59,6 @@ def serve(
                 timer.daemon = True
                 timer.start()
             if real_time:
-                link = LinkSettings("peer", (), (connect or DEFAULT_ENDPOINT,), tls=tls)
                 hosted.reset(found.drawn(seed), seed)
                 running = FreeRunning(hosted, robot, link)
                 notes.print(f"{found.id} streams to {link.connect[0]}", markup=False)
@@ -74,10 +66,6 @@ def serve(
                 said = f"at worst {late_s * 1e3:.1f} ms late"
                 result = {"late_s": late_s, "guard": running.guard.counts, "events": hosted.events()}
             else:
-                if connect is not None:
-                    link = LinkSettings("client", (), (connect,), tls=tls)
-                else:
-                    link = LinkSettings("peer", (listen or STEPPED_ENDPOINT,), tls=tls)
                 notes.print(f"{found.id} is stepped at {', '.join((*link.listen, *link.connect))}", markup=False)
                 SteppedServer(hosted, robot, link).serve(stop)
                 result, said = {}, ""

@@ -8,6 +8,7 @@ from foreshock.live._serve import FreeRunning, SteppedServer
 from foreshock.live._services import ResetRequest
 from foreshock.live._settings import JournalSettings, LiveSettings
 from foreshock.live._status import Status
+from foreshock.live._stream import StreamCounts
 
 __all__ = [
     "Denied",
@@ -21,6 +22,7 @@ __all__ = [
     "RunConfig",
     "Status",
     "SteppedServer",
+    "StreamCounts",
     "access_rules",
     "init_security",
     "load_run",

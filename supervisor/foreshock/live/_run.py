@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from foreshock.clock import NS_PER_S, monotonic_ns, sleep_until, wall_ns
-from foreshock.errors import BadInputError, ConfigError, nearest
+from foreshock.errors import BadInputError, ConfigError
 from foreshock.journal import DigestJournal
 from foreshock.link import keys_of, open_link, ros_tokens
 from foreshock.live._config import RunConfig
@@ -284,7 +284,7 @@ def _channels(run: RunConfig, supervisor: Supervisor) -> dict[str, type]:
     """Every channel that a detector reads, or that the configuration adds, with its message class.
 
     Raises:
-        ConfigError: two detectors want different types on one channel, or a type that does not exist.
+        ConfigError: two detectors want different types on one channel.
     """
     found: dict[str, type] = {}
     robot = run.config.supervisor.robot
@@ -293,8 +293,6 @@ def _channels(run: RunConfig, supervisor: Supervisor) -> dict[str, type]:
             problem = f"{cls.__name__} and {found[channel].__name__} are both read from it"
             raise ConfigError(f"channel {channel}", problem)
     for name, kind in run.live.streams.items():
-        if kind not in BY_NAME:
-            raise ConfigError(f"live.streams.{name}", f"there is no message {kind!r}", nearest(kind, BY_NAME))
         found.setdefault(f"{robot}/{name}", BY_NAME[kind])
     if not found:
         raise BadInputError("live.streams", "no detector reads a channel, and none is given")

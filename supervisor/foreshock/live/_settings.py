@@ -5,9 +5,12 @@ from __future__ import annotations
 import msgspec
 
 from foreshock._strict import within
-from foreshock.errors import ConfigError
+from foreshock.errors import ConfigError, nearest
+from foreshock.wire import ROS_NAMES
 
 __all__ = ["JournalSettings", "LiveSettings"]
+
+MESSAGES = tuple(cls.__name__ for cls in ROS_NAMES)
 
 
 class LiveSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -39,6 +42,9 @@ class LiveSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         within("live.decision_hz", self.decision_hz, 0.0, above=True)
         within("live.history_s", self.history_s, 0.0, 600.0)
         within("live.max_skew_s", self.max_skew_s, 0.0, above=True)
+        for name, kind in self.streams.items():
+            if kind not in MESSAGES:
+                raise ConfigError(f"live.streams.{name}", f"there is no message {kind!r}", nearest(kind, MESSAGES))
 
 
 class JournalSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
