@@ -154,7 +154,7 @@ def test_failures_are_counted_and_left_out_of_pairs(plan: Plan) -> None:
 
 
 def worse(before: list[Row], after: list[Row], plan: Plan) -> set[tuple[str, str, str]]:
-    return {(c.scope.name, c.arm, c.metric) for c in compare((plan, before), (plan, after)) if c.worse}
+    return {(c.scope.name, c.arm, c.metric) for c in compare((plan, before), (plan, after)).changes if c.worse}
 
 
 def test_comparison_finds_what_got_worse_and_only_that(plan: Plan) -> None:
@@ -181,6 +181,6 @@ def test_comparison_of_other_seeds_is_by_independent_samples() -> None:
     rng = random.Random(3)
     before = rows(one, lambda arm, seed: arm == "shadow" or rng.random() < 0.1, lambda *_: None)
     after = rows(two, lambda arm, seed: arm == "shadow" or rng.random() < 0.7, lambda *_: None)
-    changes = compare((one, before), (two, after))
+    changes = compare((one, before), (two, after)).changes
     assert not any(c.paired for c in changes)
     assert {(c.arm, c.metric) for c in changes if c.worse} == {("on", "accidents"), ("early", "accidents")}
