@@ -227,9 +227,9 @@ def test_a_browser_shows_the_report(smoke: Path, tmp_path: Path) -> None:
     found = re.findall(r'<svg class="panel".*?</svg>', dom, re.DOTALL)
     assert len(found) == 4
     for (width, height), panel in zip(panels, found, strict=True):
-        circles = re.findall(r'<circle cx="([^"]+)" cy="([^"]+)"', panel)
-        assert circles
-        for x, y in circles:
+        marks = re.findall(r'<path class="mark" transform="translate\(([\d.-]+) ([\d.-]+)\)', panel)
+        assert marks
+        for x, y in marks:
             assert 0.0 <= float(x) <= float(width)
             assert 0.0 <= float(y) <= float(height)
 
@@ -241,13 +241,13 @@ def test_a_browser_draws_the_colours_of_the_arms(smoke: Path, tmp_path: Path) ->
 
     page = (smoke / "report.html").read_text()
     bare = tmp_path / "bare.html"
-    bare.write_text(re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL))
+    bare.write_text(re.sub(r"<svg (?!class=.key).*?</svg>", "", page, flags=re.DOTALL))
     counts = []
     for name, file in (("full", smoke / "report.html"), ("bare", bare)):
         shot = tmp_path / f"{name}.png"
         chromium(file, tmp_path / name, f"--screenshot={shot}", "--window-size=1300,3600")
         pixels = imread(shot)[:, :, :3]
-        orange = abs(pixels - [0xD9 / 255, 0x8A / 255, 0.0]).max(axis=2) < 0.02
+        orange = abs(pixels - [0xFF / 255, 0x7F / 255, 0x0E / 255]).max(axis=2) < 0.02
         counts.append(int(orange.sum()))
     assert counts[0] > 4 * counts[1] > 0
 
@@ -276,6 +276,8 @@ def test_the_ranking_is_written_as_markdown(smoke: Path, tmp_path: Path) -> None
     text = file.read_text()
     tables = [line for line in text.splitlines() if line.startswith("|")]
     assert {line.count("|") for line in tables} == {5, 8}
+    for told in (text, (smoke / "report.html").read_text()):  # a command, which a faulty plant may not follow
+        assert "time at reduced speed, as commanded" in told
     # four runs an arm show nothing, and so nobody wins
     assert "| A1 | `on` | 0/4 (0–49%) |" in text
     assert text.count("nobody | nobody |") == 1
