@@ -103,6 +103,6 @@ def test_what_got_worse_under_a_fault_alone_is_found(plan: Plan) -> None:
         else r
         for r in before
     ]
-    found = [c for c in compare((plan, before), (plan, after)) if c.worse]
+    found = [c for c in compare((plan, before), (plan, after)).changes if c.worse]
     assert [(c.scope, c.arm, c.metric) for c in found] == [(Scope("fault", "blind"), "on", "accidents")]
-    assert not any(c.worse for c in compare((plan, after), (plan, before)))
+    assert not any(c.worse for c in compare((plan, after), (plan, before)).changes)

@@ -184,10 +184,10 @@ def test_traceability_says_what_is_shown_and_what_is_not(plan: Plan) -> None:
 def test_more_time_at_reduced_speed_is_worse_and_less_is_not(plan: Plan) -> None:
     before = rows(plan, story)
     slower = [msgspec.structs.replace(r, reduced_s=(r.reduced_s or 0.0) + 0.2) if r.arm == "on" else r for r in before]
-    found = [c for c in compare((plan, before), (plan, slower)) if c.worse]
+    found = [c for c in compare((plan, before), (plan, slower)).changes if c.worse]
     assert [(c.arm, c.metric) for c in found] == [("on", "reduced-speed")]
     assert (found[0].before, found[0].after) == (pytest.approx(0.05), pytest.approx(0.07))
-    assert not any(c.worse for c in compare((plan, slower), (plan, before)))
+    assert not any(c.worse for c in compare((plan, slower), (plan, before)).changes)
 
 
 @given(st.dictionaries(st.text(max_size=3), st.tuples(*[st.integers(0, 4).map(float)] * 2), min_size=1, max_size=8))

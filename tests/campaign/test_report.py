@@ -16,11 +16,13 @@ import msgspec
 import pyarrow.parquet as pq
 import pytest
 
+from tests.campaign.conftest import ROGUE
+
 CHROMIUM = shutil.which("chromium")
 
 
-def foreshock(*words: str, code: int = 0) -> str:
-    done = subprocess.run(
+def started(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
         [sys.executable, "-c", "from foreshock.cli import main; main()", "campaign", *words],
         capture_output=True,
         text=True,
@@ -28,6 +30,10 @@ def foreshock(*words: str, code: int = 0) -> str:
         timeout=300,
         env={**os.environ, "COLUMNS": "200"},
     )
+
+
+def foreshock(*words: str, code: int = 0) -> str:
+    done = started(*words)
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout
 
@@ -99,6 +105,69 @@ def test_a_comparison_of_nothing_is_no_good_news(smoke: Path, campaign_file: Pat
     assert "no arm and scenario with runs in common" in said["errors"][0]["message"]
 
 
+def test_a_comparison_says_what_it_leaves_out_and_fails_where_the_second_lacks_runs(tmp_path: Path) -> None:
+    text = (
+        'id = "many"\nreplicates = 2\n[[scenarios]]\nuse = "a1-fall-onto-human"\nduration_s = 0.05\n'
+        '[[arms]]\nid = "none"\nkind = "none"\n'
+    )
+    more = '[[scenarios]]\nuse = "a2-arm-torso-strike"\nduration_s = 0.05\n[[arms]]\nid = "shadow"\nkind = "shadow"\n'
+    for name, content in (("few", text), ("all", text + more), ("long", text.replace("0.05", "0.06"))):
+        (tmp_path / f"{name}.toml").write_text(content)
+        foreshock("run", str(tmp_path / f"{name}.toml"), "--out", str(tmp_path / name), "--workers", "1")
+    few, whole, long = (str(tmp_path / name) for name in ("few", "all", "long"))
+    foreshock("compare", whole, few, "--allow-missing")
+    said = json.loads(foreshock("compare", whole, few, "--json", code=1))["result"]
+    assert (said["first"]["done"], said["second"]["done"], said["second"]["planned"]) == (8, 2, 2)
+    assert said["not_compared"] == {"scenarios": ["a2-arm-torso-strike"], "arms": ["shadow"], "faults": []}
+    assert {(m["scenario"], m["arm"]): m["runs"] for m in said["missing"]} == {
+        ("a1-fall-onto-human", "shadow"): 2,
+        ("a2-arm-torso-strike", "none"): 2,
+        ("a2-arm-torso-strike", "shadow"): 2,
+    }
+    assert "campaign.arms.shadow is gone" in said["differs"]
+    foreshock("compare", few, whole)
+    said = json.loads(foreshock("compare", few, long, "--json", code=2))
+    assert "scenarios.a1-fall-onto-human.duration_s was 0.05, is 0.06" in said["errors"][0]["message"]
+
+
+def test_a_campaign_is_reported_and_compared_although_its_scenario_and_plant_are_gone(
+    campaign_file: Path, tmp_path: Path
+) -> None:
+    """What the ledger holds is all that it takes; that nobody can tell what has changed is said."""
+    plant, scenario, out = tmp_path / "plants" / "rogue", tmp_path / "rogue.toml", tmp_path / "out"
+    shutil.copytree(ROGUE, plant)
+    scenario.write_text(scenario.read_text().replace(str(ROGUE), str(plant)))
+    foreshock("run", str(campaign_file), "--out", str(out), "--workers", "1")
+    before = json.loads(foreshock("report", str(out), "--json"))["result"]["results"]
+    for gone in (plant, scenario):
+        shutil.move(gone, tmp_path / "away")
+        state = json.loads(foreshock("status", str(out), "--json"))["result"]
+        assert (state["planned"], state["done"]) == (60, 60)
+        assert "cannot be compared" in state["changed"][0]
+        assert str(gone) in state["changed"][0]
+        assert json.loads(foreshock("report", str(out), "--json"))["result"]["results"] == before
+        foreshock("compare", str(out), str(out))
+        said = json.loads(foreshock("resume", str(out), "--json", code=2))
+        assert str(gone) in said["errors"][0]["message"]
+        shutil.move(tmp_path / "away", gone)
+
+
+def test_a_run_that_is_done_again_with_a_report_is_still_one_json(campaign_file: Path, tmp_path: Path) -> None:
+    """A run without a result has no report, and that is said."""
+    factor = '[[factors]]\nparameter = "behaviour"\nvalues = [0, 3]\n'  # rogue.toml: 3 is NaN
+    campaign_file.write_text(campaign_file.read_text().replace("replicates = 12", "replicates = 1") + factor)
+    out = tmp_path / "out"
+    foreshock("run", str(campaign_file), "--out", str(out), "--workers", "1", code=3)
+    keys = {r["status"]: r["key"] for r in pq.read_table(out / "runs.parquet").to_pylist() if r["arm"] == "on"}
+    page = tmp_path / "page.html"
+    for status, told in (("ok", f"report: {page}"), ("nan", "no report: the run gave no result (nan)")):
+        done = started("rerun", str(out), keys[status], "--json", "--report", str(page))
+        assert json.loads(done.stdout)["ok"]
+        assert told in done.stderr
+        assert page.exists() == (status == "ok")
+        page.unlink(missing_ok=True)
+
+
 def test_results_do_not_depend_on_the_number_of_workers(campaign_file: Path, tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
     for folder, workers in ((one, "1"), (two, "2")):
@@ -158,9 +227,9 @@ def test_a_browser_shows_the_report(smoke: Path, tmp_path: Path) -> None:
     found = re.findall(r'<svg class="panel".*?</svg>', dom, re.DOTALL)
     assert len(found) == 4
     for (width, height), panel in zip(panels, found, strict=True):
-        circles = re.findall(r'<circle cx="([^"]+)" cy="([^"]+)"', panel)
-        assert circles
-        for x, y in circles:
+        marks = re.findall(r'<path class="mark" transform="translate\(([\d.-]+) ([\d.-]+)\)', panel)
+        assert marks
+        for x, y in marks:
             assert 0.0 <= float(x) <= float(width)
             assert 0.0 <= float(y) <= float(height)
 
@@ -172,13 +241,13 @@ def test_a_browser_draws_the_colours_of_the_arms(smoke: Path, tmp_path: Path) ->
 
     page = (smoke / "report.html").read_text()
     bare = tmp_path / "bare.html"
-    bare.write_text(re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL))
+    bare.write_text(re.sub(r"<svg (?!class=.key).*?</svg>", "", page, flags=re.DOTALL))
     counts = []
     for name, file in (("full", smoke / "report.html"), ("bare", bare)):
         shot = tmp_path / f"{name}.png"
         chromium(file, tmp_path / name, f"--screenshot={shot}", "--window-size=1300,3600")
         pixels = imread(shot)[:, :, :3]
-        orange = abs(pixels - [0xD9 / 255, 0x8A / 255, 0.0]).max(axis=2) < 0.02
+        orange = abs(pixels - [0xFF / 255, 0x7F / 255, 0x0E / 255]).max(axis=2) < 0.02
         counts.append(int(orange.sum()))
     assert counts[0] > 4 * counts[1] > 0
 
@@ -207,6 +276,8 @@ def test_the_ranking_is_written_as_markdown(smoke: Path, tmp_path: Path) -> None
     text = file.read_text()
     tables = [line for line in text.splitlines() if line.startswith("|")]
     assert {line.count("|") for line in tables} == {5, 8}
+    for told in (text, (smoke / "report.html").read_text()):  # a command, which a faulty plant may not follow
+        assert "time at reduced speed, as commanded" in told
     # four runs an arm show nothing, and so nobody wins
     assert "| A1 | `on` | 0/4 (0–49%) |" in text
     assert text.count("nobody | nobody |") == 1

@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from statsmodels.stats.contingency_tables import mcnemar as sm_mcnemar
 from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.proportion import proportion_confint
+from statsmodels.stats.rates import confint_poisson
 
 from foreshock.campaign import Plan, Row, parse_campaign, plan_of
 from foreshock.campaign.compare import compare
 from foreshock.campaign.paired import holm, mcnemar, paired_difference
 from foreshock.campaign.results import ArmResult, results_of
 from foreshock.registry import Registry
+from foreshock.session.rates import per_hour
 
 EXACT = 1e-12
 """Both compute the same closed form or binomial sum; what differs is rounding."""
@@ -34,6 +36,12 @@ def test_mcnemar_is_that_of_statsmodels(b: int, c: int) -> None:
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20))
 def test_holm_is_that_of_statsmodels(p: list[float]) -> None:
     assert holm(p) == pytest.approx(list(multipletests(p, method="holm")[1]), abs=EXACT)
+
+
+@pytest.mark.parametrize(("k", "hours"), [(0, 0.5), (1, 0.015), (3, 3.0), (16, 0.497), (250, 12.0)])
+def test_frequency_is_that_of_statsmodels(k: int, hours: float) -> None:
+    found = per_hour(k, hours)
+    assert (found.low, found.high) == pytest.approx(confint_poisson(k, hours, method="exact-c"), rel=EXACT)
 
 
 def test_paired_difference_is_the_closed_form_and_covers() -> None:
@@ -154,7 +162,7 @@ def test_failures_are_counted_and_left_out_of_pairs(plan: Plan) -> None:
 
 
 def worse(before: list[Row], after: list[Row], plan: Plan) -> set[tuple[str, str, str]]:
-    return {(c.scope.name, c.arm, c.metric) for c in compare((plan, before), (plan, after)) if c.worse}
+    return {(c.scope.name, c.arm, c.metric) for c in compare((plan, before), (plan, after)).changes if c.worse}
 
 
 def test_comparison_finds_what_got_worse_and_only_that(plan: Plan) -> None:
@@ -181,6 +189,6 @@ def test_comparison_of_other_seeds_is_by_independent_samples() -> None:
     rng = random.Random(3)
     before = rows(one, lambda arm, seed: arm == "shadow" or rng.random() < 0.1, lambda *_: None)
     after = rows(two, lambda arm, seed: arm == "shadow" or rng.random() < 0.7, lambda *_: None)
-    changes = compare((one, before), (two, after))
+    changes = compare((one, before), (two, after)).changes
     assert not any(c.paired for c in changes)
     assert {(c.arm, c.metric) for c in changes if c.worse} == {("on", "accidents"), ("early", "accidents")}

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any, TypeAlias
 
 import msgspec
 
+from foreshock.campaign.identity import changes, digest
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.paired import holm, mcnemar
 from foreshock.campaign.plan import Plan
 from foreshock.campaign.results import Scope, scopes_of
 
-__all__ = ["LEVEL", "Change", "compare"]
+__all__ = ["LEVEL", "Change", "Comparison", "Missing", "compare"]
 
 LEVEL = 0.05
 """Chance that any result is called worse where nothing has changed."""
@@ -21,7 +25,10 @@ LEVEL = 0.05
 WITHOUT = Scope("fault", "no fault")
 """The same runs as those of the whole."""
 
-Seat = tuple[str, str, int, int, str]
+Group: TypeAlias = tuple[str, str, str]
+"""Scenario, arm and fault."""
+Seat: TypeAlias = tuple[str, str, int]
+"""Hash of the experiment, values of the factors, and seed: all of a run but the supervisor, which is compared."""
 
 
 class Change(msgspec.Struct, frozen=True):
@@ -53,38 +60,133 @@ class Change(msgspec.Struct, frozen=True):
         return self.p < LEVEL
 
 
-def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]]) -> list[Change]:
-    """Every metric of the arms and scenarios that both campaigns have, overall, per mode and per fault.
+class Missing(msgspec.Struct, frozen=True):
+    """Runs of the first campaign that the second has no like of: scenario, arm, fault, and how many."""
+
+    scenario: str
+    arm: str
+    fault: str
+    runs: int
+
+
+class Comparison(msgspec.Struct, frozen=True):
+    """One campaign against another.
+
+    Attributes:
+        changes: every metric that could be compared.
+        missing: what the first has and the second does not.
+        not_compared: ids of ``scenarios``, ``arms`` and ``faults`` of either of which nothing was compared: only one
+            has them, or they are not the same.
+        differs: what differs between what the results of both depend on, beside the code; a line for each leaf.
+    """
+
+    changes: tuple[Change, ...]
+    missing: tuple[Missing, ...]
+    not_compared: dict[str, tuple[str, ...]]
+    differs: tuple[str, ...]
+
+
+class _Side:
+    """One campaign: what its runs count as, and the runs by group and seat."""
+
+    def __init__(self, plan: Plan, rows: Sequence[Row]) -> None:
+        self.plan, self.outcomes = plan, Outcomes(plan, rows)
+        self._faults = {f.id: f.faults for f in plan.spec.faults}
+        self._hashes: dict[tuple[str, str], str] = {}
+        self.runs: dict[Group, dict[Seat, Row]] = {}
+        for r in rows:
+            parameters = ",".join(f"{k}={v!r}" for k, v in sorted(r.parameters.items()))
+            seat = self.experiment(r.scenario, r.fault), parameters, r.seed
+            self.runs.setdefault((r.scenario, r.arm, r.fault), {})[seat] = r
+
+    def experiment(self, scenario: str, fault: str) -> str:
+        """Hash of the scenario without its supervisor, and of what is injected."""
+        key = scenario, fault
+        if key not in self._hashes:
+            content = {k: v for k, v in self.plan.identity["scenarios"][scenario].items() if k != "config"}
+            self._hashes[key] = digest([content, self._faults.get(fault, ())])
+        return self._hashes[key]
+
+    def drawn(self, group: Group) -> tuple[Any, ...]:
+        """What the runs of a group are samples of."""
+        spec = self.plan.spec
+        factors = [f for f in spec.factors if any(fnmatchcase(group[0], pattern) for pattern in f.scenarios)]
+        return self.experiment(group[0], group[2]), spec.sampler if factors else "", factors
+
+
+def compare(before: tuple[Plan, Sequence[Row]], after: tuple[Plan, Sequence[Row]]) -> Comparison:
+    """Every metric of what both campaigns have, overall, per mode and per fault.
 
     Runs of the same scenario, parameters, fault, seed and arm are compared one by one (McNemar; Wilcoxon's signed ranks
-    for times); where the campaigns share none, as independent samples (Fisher's exact test; Mann and Whitney's).
+    for times); where the campaigns share no seed, as independent samples of the same factors (Fisher's exact test; Mann
+    and Whitney's). A scenario or a fault is the same by content, but for the configuration of the supervisor.
 
     Args:
         before: plan and rows of the first campaign.
         after: of the second.
     """
-    arms = {a.id: a for a in before[0].spec.arms}
-    shared = [a for a in after[0].spec.arms if a.id in arms]
-    sides = [Outcomes(*before), Outcomes(*after)]
-    both = {r.scenario for r in before[1]} & {r.scenario for r in after[1]}
-    tables = [[r for r in rows if r.scenario in both] for _, rows in (before, after)]
-    found: list[Change] = []
-    scopes = [
-        s for s in scopes_of([*tables[0], *tables[1]]) if s[0].kind in ("overall", "mode", "fault") and s[0] != WITHOUT
-    ]
+    first, second = _Side(*before), _Side(*after)
+    pairs: list[Group] = []
+    samples: list[Group] = []
+    missing = []
+    for group, mine in first.runs.items():
+        other = second.runs.get(group, {})
+        lacks = len(mine)
+        if shared := mine.keys() & other.keys():
+            pairs.append(group)
+            lacks -= len(shared)
+        elif other and first.drawn(group) == second.drawn(group):
+            samples.append(group)
+            lacks -= len(other)
+        if lacks > 0:
+            missing.append(Missing(*group, lacks))
+    return Comparison(
+        tuple(_all_changes(first, second, (pairs, samples))),
+        tuple(missing),
+        _not_compared(before[0], after[0], [*pairs, *samples]),
+        tuple(changes(_told(before[0].identity), _told(after[0].identity))),
+    )
+
+
+def _all_changes(first: _Side, second: _Side, kinds: Sequence[Sequence[Group]]) -> list[Change]:
+    """Of pairs and of independent samples: where a part has both, each is a result of its own."""
+    sides = [first.outcomes, second.outcomes]
+    arms = [a.id for a in second.plan.spec.arms]
+    every = [r for side in (first, second) for g in itertools.chain(*kinds) for r in side.runs[g].values()]
+    scopes = [s for s in scopes_of(every) if s[0].kind in ("overall", "mode", "fault") and s[0] != WITHOUT]
     several = sum(scope.kind == "mode" for scope, _ in scopes) > 1
+    found: list[Change] = []
     for scope, belongs in scopes if several else scopes[1:]:  # one mode is the whole
-        for arm in shared:
-            first, second = ({_seat(r): r for r in rows if r.arm == arm.id and belongs(r)} for rows in tables)
-            if first and second:
-                found += _changes(scope, arm.id, sides, first, second)
+        for arm in arms:
+            for groups in kinds:
+                mine = [g for g in groups if g[1] == arm]
+                a, b = ({s: r for g in mine for s, r in side.runs[g].items() if belongs(r)} for side in (first, second))
+                if a and b:
+                    found += _changes(scope, arm, sides, a, b)
     adjusted = holm([c.p for c in found])
     return [msgspec.structs.replace(c, p=p) for c, p in zip(found, adjusted, strict=True)]
 
 
-def _seat(row: Row) -> Seat:
-    parameters = ",".join(f"{k}={v!r}" for k, v in sorted(row.parameters.items()))
-    return row.scenario, parameters, row.seed, row.replicate, row.fault
+def _not_compared(before: Plan, after: Plan, compared: Sequence[Group]) -> dict[str, tuple[str, ...]]:
+    declared = [
+        {
+            "scenarios": list(plan.scenarios),
+            "arms": [a.id for a in plan.spec.arms],
+            "faults": [f.id for f in plan.spec.faults],
+        }
+        for plan in (before, after)
+    ]
+    return {
+        name: tuple(id_ for id_ in dict.fromkeys(declared[0][name] + declared[1][name]) if id_ not in seen)
+        for name, seen in zip(declared[0], ({g[k] for g in compared} for k in (0, 1, 2)), strict=True)
+    }
+
+
+def _told(identity: Mapping[str, Any]) -> dict[str, Any]:
+    """An identity without the code, arms and faults by their ids."""
+    campaign = identity["campaign"]
+    named = {name: {entry["id"]: entry for entry in campaign[name]} for name in ("arms", "faults")}
+    return {**{k: v for k, v in identity.items() if k != "code"}, "campaign": {**campaign, **named}}
 
 
 def _changes(

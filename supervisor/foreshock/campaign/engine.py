@@ -102,8 +102,9 @@ def reopen(folder: Path, registry: Registry, *, accept: bool = False) -> tuple[C
 
 
 def _facts(plan: Plan) -> dict[str, Any]:
-    """What is kept of a plan: what it depends on, and the keys of its runs."""
-    return {"identity": plan.identity, "keys": [c.key for c in plan.cases]}
+    """What is kept of a plan: what it depends on, its scenarios, and its runs and their keys."""
+    kept = {"identity": plan.identity, "scenarios": plan.scenarios, "cases": plan.cases}
+    return {**kept, "keys": [c.key for c in plan.cases]}
 
 
 def refuse_changes(

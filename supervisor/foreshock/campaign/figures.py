@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 
 from foreshock.campaign.ledger import Row
+from foreshock.campaign.looks import Look
 from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.plan import Plan
 from foreshock.campaign.results import ArmResult, scopes_of
@@ -21,7 +22,7 @@ class _Dot(msgspec.Struct, frozen=True):
 
     x: float
     y: float
-    colour: str
+    look: Look
     target: str
     text: str
     low: float | None = None
@@ -36,7 +37,7 @@ def groups_of(rows: Sequence[Row]) -> dict[str, list[Row]]:
     return found
 
 
-def rate_figure(results: Sequence[ArmResult], colours: Mapping[str, str], rows: Sequence[Row]) -> dict[str, Any]:
+def rate_figure(results: Sequence[ArmResult], looks: Mapping[str, Look], rows: Sequence[Row]) -> dict[str, Any]:
     """Accident rates with their intervals: one line per arm, in blocks for the whole, each mode and each fault.
 
     A point leads to a run with the accident, or to any run behind it where there is none.
@@ -56,12 +57,12 @@ def rate_figure(results: Sequence[ArmResult], colours: Mapping[str, str], rows: 
         key = next(row.key for row in (*(row for row in mine if row.accident), *mine))
         share = r.accidents.k / r.accidents.n
         text = f"{name}, {r.arm}: {r.accidents}"
-        dots.append(_Dot(share, y, colours[r.arm], f"r-{key}", text, r.accidents.low, r.accidents.high))
+        dots.append(_Dot(share, y, looks[r.arm], f"r-{key}", text, r.accidents.low, r.accidents.high))
     return {"labels": labels, "dots": dots, "height": y + 1.5}
 
 
 def lead_figure(
-    plan: Plan, rows: Sequence[Row], results: Sequence[ArmResult], colours: Mapping[str, str]
+    plan: Plan, rows: Sequence[Row], results: Sequence[ArmResult], looks: Mapping[str, Look]
 ) -> dict[str, Any] | None:
     """Lead times, one dot per run, one line per arm, with the quartiles of the whole; None if there are none."""
     outcomes = Outcomes(plan, rows)
@@ -74,7 +75,7 @@ def lead_figure(
             continue
         jitter = (int(r.key[:4], 16) / 65535.0 - 0.5) * 0.5  # a run lies where it lay
         text = f"{r.scenario}, {r.arm}, seed {r.seed}: {lead_s:.2f} s"
-        found.append(_Dot(lead_s, lines[r.arm] + jitter, colours[r.arm], f"r-{r.key}", text))
+        found.append(_Dot(lead_s, lines[r.arm] + jitter, looks[r.arm], f"r-{r.key}", text))
     if not found:
         return None
     quartiles = {r.arm: r.lead_quartiles_s for r in results if r.scope.kind == "overall" and r.lead_quartiles_s}

@@ -12,6 +12,7 @@ from foreshock.campaign.engine import Campaign
 from foreshock.campaign.fault_effects import fault_effects
 from foreshock.campaign.figures import groups_of, lead_figure, maps_of, rate_figure
 from foreshock.campaign.ledger import Row
+from foreshock.campaign.looks import Look, looks_of
 from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.panels import Panel, forecast_panels, pareto_panel
 from foreshock.campaign.ranking import Duel, Standing
@@ -22,12 +23,6 @@ from foreshock.errors import MissingExtraError
 
 __all__ = ["write_page"]
 
-# fmt: off
-COLOURS = (
-    "#7a7a7a", "#d98a00", "#1f6fb2", "#2a9d5c", "#8e44ad", "#c0392b", "#16a085", "#7f5539", "#34495e", "#b5179e",
-    "#94a000", "#5bb0e8",
-)
-# fmt: on
 LARGE, SMALL = (400.0, 320.0), (290.0, 230.0)
 
 
@@ -50,14 +45,14 @@ def write_page(
         ranking: of standings_of and duels_of.
 
     Raises:
-        MissingExtraError: jinja2 or scikit-learn is not installed.
+        MissingExtraError: jinja2, matplotlib or scikit-learn is not installed.
     """
     try:
         import jinja2
     except ImportError as e:
         raise MissingExtraError("report", f"needs {e.name}", "; run: pip install 'foreshock[campaign]'") from e
     plan, spec = campaign.plan, campaign.plan.spec
-    colours = {a.id: COLOURS[k % len(COLOURS)] for k, a in enumerate(spec.arms)}
+    looks = looks_of(a.id for a in spec.arms)
     outcomes = Outcomes(plan, rows)
     source = files("foreshock").joinpath("data/campaign.html.j2").read_text()
     page = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -68,7 +63,7 @@ def write_page(
             spec=spec,
             total=len(plan.cases),
             command=f"foreshock campaign rerun {shlex.quote(str(campaign.folder))}",
-            colours=colours,
+            looks=looks,
             reference=spec.reference_arm,
             rows=rows,
             groups=groups_of(rows),
@@ -81,14 +76,14 @@ def write_page(
             faults=fault_effects(plan, rows),
             parts=[r for r in results if r.scope.kind in ("scenario", "factor")],
             partial=_partial(results),
-            rates=rate_figure(main, colours, rows),
-            leads=lead_figure(plan, rows, results, colours),
+            rates=rate_figure(main, looks, rows),
+            leads=lead_figure(plan, rows, results, looks),
             maps=maps_of(rows),
             traces=_matrix(traces),
             untested=[t for t in traces if not t.scenario],
             standings=worth_telling(ranking[0]),
             bouts=worth_telling(bouts(ranking[1], results)),
-            **_panels(campaign, rows, main, colours),
+            **_panels(campaign, rows, main, looks),
         )
     )
 
@@ -111,7 +106,7 @@ def _matrix(traces: Sequence[Trace]) -> list[tuple[str, str, str, dict[str, list
 
 
 def _panels(
-    campaign: Campaign, rows: Sequence[Row], main: Sequence[ArmResult], colours: dict[str, str]
+    campaign: Campaign, rows: Sequence[Row], main: Sequence[ArmResult], looks: dict[str, Look]
 ) -> dict[str, Any]:
     """Pareto and forecast panels: large ones of the first part, small ones of the modes."""
     pareto: list[Panel] = []
@@ -122,8 +117,8 @@ def _panels(
         mine = [r for r in main if r.scope == scope]
         runs = [r for r in rows if belongs[scope](r)]
         size = SMALL if k else LARGE
-        if (panel := pareto_panel(scope, mine, runs, campaign.plan, colours, size)) is not None:
+        if (panel := pareto_panel(scope, mine, runs, campaign.plan, looks, size)) is not None:
             pareto.append(panel)
-        if panels := forecast_panels(mine, runs, colours, size):
+        if panels := forecast_panels(mine, runs, looks, size):
             forecast.append((scope.name or "overall", [r for r in mine if r.brier is not None], panels))
     return {"pareto": pareto, "forecast": forecast}

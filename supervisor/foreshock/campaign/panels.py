@@ -9,6 +9,7 @@ import msgspec
 
 from foreshock.campaign.forecast import BINS, bin_of, precision_recall, roc
 from foreshock.campaign.ledger import Row
+from foreshock.campaign.looks import Look
 from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.plan import Plan
 from foreshock.campaign.results import ArmResult, Scope, forecasts, frequency
@@ -16,6 +17,7 @@ from foreshock.campaign.results import ArmResult, Scope, forecasts, frequency
 __all__ = ["Mark", "Panel", "forecast_panels", "front_of", "pareto_panel"]
 
 LEFT, TOP, RIGHT, BOTTOM = 46.0, 24.0, 12.0, 40.0
+DASH = "4 3"
 SHARES = ((0.0, "0"), (0.25, "0.25"), (0.5, "0.5"), (0.75, "0.75"), (1.0, "1"))
 
 
@@ -27,7 +29,7 @@ class Mark(msgspec.Struct, frozen=True):
 
     x: float
     y: float
-    colour: str
+    look: Look
     target: str
     text: str
     bars: tuple[tuple[float, float, float, float], ...] = ()
@@ -36,7 +38,7 @@ class Mark(msgspec.Struct, frozen=True):
 
 
 class Panel(msgspec.Struct, frozen=True):
-    """A figure: ticks are places and texts, lines are points, colour and whether they are dashed."""
+    """A figure: ticks are places and texts, lines are points, colour and dashes."""
 
     title: str
     width: float
@@ -45,7 +47,7 @@ class Panel(msgspec.Struct, frozen=True):
     y_label: str
     x_ticks: tuple[tuple[float, str], ...]
     y_ticks: tuple[tuple[float, str], ...]
-    lines: tuple[tuple[str, str, bool], ...]
+    lines: tuple[tuple[str, str, str], ...]
     marks: tuple[Mark, ...]
     left: float = LEFT
     top: float = TOP
@@ -65,16 +67,14 @@ class _Frame:
     def y(self, share: float) -> float:
         return self.height - BOTTOM - share * (self.height - TOP - BOTTOM)
 
-    def line(
-        self, points: Sequence[tuple[float, float]], colour: str, *, dashed: bool = False
-    ) -> tuple[str, str, bool]:
-        return " ".join(f"{self.x(x):.1f},{self.y(y):.1f}" for x, y in points), colour, dashed
+    def line(self, points: Sequence[tuple[float, float]], colour: str, dash: str = DASH) -> tuple[str, str, str]:
+        return " ".join(f"{self.x(x):.1f},{self.y(y):.1f}" for x, y in points), colour, dash
 
     def panel(
         self,
         title: str,
         labels: tuple[str, str],
-        lines: Sequence[tuple[str, str, bool]],
+        lines: Sequence[tuple[str, str, str]],
         marks: Sequence[Mark],
         x_ticks: Sequence[tuple[float, str]] = SHARES,
     ) -> Panel:
@@ -97,7 +97,7 @@ def pareto_panel(
     results: Sequence[ArmResult],
     rows: Sequence[Row],
     plan: Plan,
-    colours: Mapping[str, str],
+    looks: Mapping[str, Look],
     size: tuple[float, float],
 ) -> Panel | None:
     """Accident rate against false interventions per hour, of the arms that act, and of none.
@@ -109,7 +109,7 @@ def pareto_panel(
         results: of it.
         rows: runs of it.
         plan: of the campaign.
-        colours: by arm.
+        looks: by arm.
         size: width and height.
     """
     kinds = {a.id: a.kind for a in plan.spec.arms}
@@ -144,24 +144,24 @@ def pareto_panel(
         mine = [row for row in rows if row.arm == r.arm]
         shows = [row for row in mine if row.accident] + [row for row in mine if outcomes.false(row)] + mine
         text = f"{r.arm}: accidents {r.accidents}; false interventions per hour {frequency(r.false)}"
-        place = at_x, frame.y(y), colours[r.arm], f"r-{shows[0].key}"
+        place = at_x, frame.y(y), looks[r.arm], f"r-{shows[0].key}"
         marks.append(Mark(*place, text, tuple(bars), r.arm in front))
     steps = sorted(at[name] for name in front)
-    line = frame.line([(across(x), y) for x, y in steps], "#444", dashed=True)
+    line = frame.line([(across(x), y) for x, y in steps], "#444")
     ticks = [(across(v), f"{v:g}") for v in (0, 1, 10, 100, 1000, 10000) if across(v) <= 1.0]
     labels = ("false interventions per hour", "accident rate")
     return frame.panel(scope.name or "overall", labels, [line] if len(steps) > 1 else [], marks, ticks)
 
 
 def forecast_panels(
-    results: Sequence[ArmResult], rows: Sequence[Row], colours: Mapping[str, str], size: tuple[float, float]
+    results: Sequence[ArmResult], rows: Sequence[Row], looks: Mapping[str, Look], size: tuple[float, float]
 ) -> list[Panel]:
     """ROC, precision-recall and reliability of P of the shadow arms of a part; none where P cannot be judged.
 
     Args:
         results: of the part.
         rows: its runs.
-        colours: by arm.
+        looks: by arm.
         size: width and height of a panel.
     """
     told = {r.arm: forecasts([row for row in rows if row.arm == r.arm]) for r in results if r.brier is not None}
@@ -169,16 +169,16 @@ def forecast_panels(
     frame = _Frame(*size)
     panels = []
     if curved:
-        diagonal = frame.line([(0.0, 0.0), (1.0, 1.0)], "#bbb", dashed=True)
+        diagonal = frame.line([(0.0, 0.0), (1.0, 1.0)], "#bbb")
         labels = ("false positive rate", "true positive rate")
-        panels.append(_curves(frame, "ROC", labels, curved, colours, roc, [diagonal]))
+        panels.append(_curves(frame, "ROC", labels, curved, looks, roc, [diagonal]))
         n = next(iter(curved.values()))
         base = sum(bool(r.accident) for r in n) / len(n)
-        level = frame.line([(0.0, base), (1.0, base)], "#bbb", dashed=True)
+        level = frame.line([(0.0, base), (1.0, base)], "#bbb")
         labels = ("recall", "precision")
-        panels.append(_curves(frame, "Precision-recall", labels, curved, colours, precision_recall, [level]))
+        panels.append(_curves(frame, "Precision-recall", labels, curved, looks, precision_recall, [level]))
     if told:
-        panels.append(_reliability(frame, results, told, colours))
+        panels.append(_reliability(frame, results, told, looks))
     return panels
 
 
@@ -187,25 +187,25 @@ def _curves(
     title: str,
     labels: tuple[str, str],
     told: Mapping[str, Sequence[Row]],
-    colours: Mapping[str, str],
+    looks: Mapping[str, Look],
     curve: Callable[[Sequence[float], Sequence[bool]], list[tuple[float, float, float]]],
-    lines: Sequence[tuple[str, str, bool]],
+    lines: Sequence[tuple[str, str, str]],
 ) -> Panel:
     """A curve per arm: each of its points leads to a run with just this P."""
     drawn, marks = list(lines), []
     for arm, rows in told.items():
         points = curve([r.peak_p or 0.0 for r in rows], [bool(r.accident) for r in rows])
-        drawn.append(frame.line([(x, y) for x, y, _ in points], colours[arm]))
+        drawn.append(frame.line([(x, y) for x, y, _ in points], looks[arm].colour, looks[arm].dash))
         keys = {r.peak_p: r.key for r in rows}
         for x, y, t in points:
             if t in keys:
                 text = f"{arm}: P ≥ {t:.3f}: {labels[0]} {x:.2f}, {labels[1]} {y:.2f}"
-                marks.append(Mark(frame.x(x), frame.y(y), colours[arm], f"r-{keys[t]}", text))
+                marks.append(Mark(frame.x(x), frame.y(y), looks[arm], f"r-{keys[t]}", text))
     return frame.panel(title, labels, drawn, marks)
 
 
 def _reliability(
-    frame: _Frame, results: Sequence[ArmResult], told: Mapping[str, Sequence[Row]], colours: Mapping[str, str]
+    frame: _Frame, results: Sequence[ArmResult], told: Mapping[str, Sequence[Row]], looks: Mapping[str, Look]
 ) -> Panel:
     """Share of accidents against mean P, by bins of P, with the number of runs in each."""
     marks = []
@@ -219,6 +219,6 @@ def _reliability(
             bar = (x + shift, frame.y(b.rate.low), x + shift, frame.y(b.rate.high))
             text = f"{result.arm}: P in {b.low:.1f}–{b.high:.1f}, mean {b.mean:.3f}: accidents {b.rate}"
             label = (str(b.rate.n), 12.0 * k)
-            marks.append(Mark(x + shift, y, colours[result.arm], f"r-{key}", text, (bar,), False, label))
-    diagonal = frame.line([(0.0, 0.0), (1.0, 1.0)], "#bbb", dashed=True)
+            marks.append(Mark(x + shift, y, looks[result.arm], f"r-{key}", text, (bar,), False, label))
+    diagonal = frame.line([(0.0, 0.0), (1.0, 1.0)], "#bbb")
     return frame.panel("Reliability", ("mean highest P", "share with the accident"), [diagonal], marks)

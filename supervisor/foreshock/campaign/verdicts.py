@@ -81,7 +81,7 @@ def markdown(plan: Plan, total: tuple[int, int], standings: Sequence[Standing], 
         "First places by the figures alone, of arms that ran in all scenarios of the part"
         f"{', without faults' if spec.faults else ''}; the last two columns are of arms that decide and act.",
         "",
-        "| part | fewest accidents | fewest false interventions per hour | least time at reduced speed |",
+        "| part | fewest accidents | fewest false interventions per hour | least time at reduced speed, as commanded |",
         "|---|---|---|---|",
     ]
     for s in worth_telling(standings):
@@ -92,7 +92,8 @@ def markdown(plan: Plan, total: tuple[int, int], standings: Sequence[Standing], 
         "Arms that act by Foreshock's protection levels against all others, on the same seeds: what is significantly "
         "better or worse at 5%, corrected by Holm for all comparisons.",
         "",
-        "| part | Foreshock as | accidents | false per hour | reduced speed | better than | **loses to** |",
+        "| part | Foreshock as | accidents | false per hour | reduced speed, as commanded | better than "
+        "| **loses to** |",
         "|---|---|---|---|---|---|---|",
     ]
     for b in worth_telling(found):

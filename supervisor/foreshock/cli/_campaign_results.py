@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from foreshock.campaign.compare import Change
+from foreshock.campaign.compare import Change, Comparison
 from foreshock.campaign.export import flat_result
 from foreshock.campaign.results import ArmResult, frequency, shown
 from foreshock.campaign.spec import CampaignSpec
-from foreshock.cli.output import console, table
+from foreshock.cli.output import console, notes, table
 
-__all__ = ["print_changes", "print_results", "results_json"]
+__all__ = ["print_changes", "print_limits", "print_results", "results_json"]
 
 
 def results_json(results: Sequence[ArmResult]) -> list[dict[str, Any]]:
@@ -83,6 +83,19 @@ def print_changes(changes: Sequence[Change]) -> None:
         table(
             "Second against first; p one-sided, adjusted by Holm", *columns, rows=rows, right=("before", "after", "p")
         )
+
+
+def print_limits(found: Comparison, extent: Sequence[Mapping[str, Any]]) -> None:
+    """Say what was not compared, what is missing, and what else differs."""
+    lines = [f"{e['folder']}: {e['done']} of {e['planned']} runs are there" for e in extent if e["done"] < e["planned"]]
+    lines += [f"not compared: {name} {', '.join(ids)}" for name, ids in found.not_compared.items() if ids]
+    lines += [
+        f"the second lacks {m.runs} runs of the first: {', '.join(filter(None, (m.scenario, m.arm, m.fault)))}"
+        for m in found.missing
+    ]
+    lines += [f"differs: {line}" for line in found.differs]
+    for line in lines:
+        notes.print(line, markup=False, soft_wrap=True)
 
 
 def _value(change: Change, value: float) -> str:

@@ -20,10 +20,11 @@ from foreshock.campaign.compare import compare as compare_campaigns
 from foreshock.campaign.engine import Campaign, Estimate, Progress, begin, execute, refuse_changes, reopen
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.plan import Case
+from foreshock.campaign.recorded import recorded
 from foreshock.campaign.report import ranking_of, write_results
 from foreshock.campaign.results import ArmResult
 from foreshock.campaign.spec import campaign_schema, load_campaign, shipped
-from foreshock.cli._campaign_results import print_changes, print_results, results_json
+from foreshock.cli._campaign_results import print_changes, print_limits, print_results, results_json
 from foreshock.cli.output import FAILED, NEGATIVE, OK, console, emit, notes, table
 from foreshock.cli.simulate_cmd import summary, timeline
 from foreshock.errors import BadInputError, MissingExtraError
@@ -98,7 +99,7 @@ def resume(folder: Path, accept: bool, retry: bool, workers: int, dask: str | No
 @json_option
 def status(folder: Path, as_json: bool) -> int:
     """Say how far a campaign is, and what failed."""
-    found, changed = reopen(folder, Registry())
+    found, changed = recorded(folder, Registry())
     rows = found.rows()
     state = _state(found, rows, changed)
     if as_json:
@@ -122,7 +123,9 @@ def report(folder: Path, markdown: Path | None, as_json: bool) -> int:
 
     Also of a campaign that is not complete.
     """
-    found, _ = reopen(folder, Registry())
+    found, changed = recorded(folder, Registry())
+    for line in changed:
+        notes.print(f"changed since it was begun: {line}", markup=False)
     results, paths = write_results(found)
     if markdown is not None:
         markdown.write_text(ranking_of(found, results))
@@ -139,29 +142,31 @@ def report(folder: Path, markdown: Path | None, as_json: bool) -> int:
 @campaign.command()
 @click.argument("first", type=click.Path(path_type=Path, file_okay=False), metavar="A")
 @click.argument("second", type=click.Path(path_type=Path, file_okay=False), metavar="B")
+@click.option("--allow-missing", is_flag=True, help="Compare what is there although B lacks runs that A has.")
 @json_option
-def compare(first: Path, second: Path, as_json: bool) -> int:
+def compare(first: Path, second: Path, allow_missing: bool, as_json: bool) -> int:
     """Hold campaign B against campaign A, run by run where they share runs.
 
-    Exit code 1 if a result of B is significantly worse: more accidents or false interventions, less lead time, more
-    time at reduced speed, more runs without a result; 2 if they have nothing in common.
+    Exit code 1 if a result of B is significantly worse (more accidents or false interventions, less lead time, more
+    time at reduced speed as commanded, more runs without a result) or B lacks runs that A has; 2 if they have nothing
+    in common.
     """
     registry = Registry()
-    sides = [reopen(folder, registry)[0] for folder in (first, second)]
+    sides = [recorded(folder, registry)[0] for folder in (first, second)]
     rows = [c.rows() for c in sides]
-    for side, found in zip(sides, rows, strict=True):
-        if len(found) < len(side.plan.cases):
-            notes.print(f"{side.folder}: {len(found)} of {len(side.plan.cases)} runs are there", markup=False)
-    changes = compare_campaigns(*((c.plan, r) for c, r in zip(sides, rows, strict=True)))
-    if not changes:
-        raise BadInputError(str(second), f"has no arm and scenario with runs in common with {first}")
-    if missing := {a.id for a in sides[0].plan.spec.arms} - {c.arm for c in changes}:
-        notes.print(f"not compared, since only one of them has it: arm {', '.join(sorted(missing))}", markup=False)
+    found = compare_campaigns(*((c.plan, r) for c, r in zip(sides, rows, strict=True)))
+    if not found.changes:
+        told = "".join(f"\n  {line}" for line in found.differs)
+        raise BadInputError(str(second), f"has no arm and scenario with runs in common with {first}", told)
+    pairs = zip(sides, rows, strict=True)
+    extent = [{"folder": str(c.folder), "planned": len(c.plan.cases), "done": len(r)} for c, r in pairs]
     if as_json:
-        emit([{**msgspec.to_builtins(c), "worse": c.worse} for c in changes])
+        changes = [{**msgspec.to_builtins(c), "worse": c.worse} for c in found.changes]
+        emit({**msgspec.to_builtins(found), "changes": changes, "first": extent[0], "second": extent[1]})
     else:
-        print_changes(changes)
-    return NEGATIVE if any(c.worse for c in changes) else OK
+        print_changes(found.changes)
+    print_limits(found, extent)
+    return NEGATIVE if any(c.worse for c in found.changes) or (found.missing and not allow_missing) else OK
 
 
 @campaign.command()
@@ -178,14 +183,14 @@ def rerun(folder: Path, key: str, page: Path | None, journal: Path | None, as_js
     found, changed = reopen(folder, Registry())
     case = case_of(found, key, changed)
     again = rerun_case(found, case, journal)
+    if page is not None:
+        _page(page, again.result, case)
     if as_json:
         result = again.result
         shown = msgspec.structs.replace(result, series={}) if isinstance(result, Run) else _failure(result)
         emit({"case": case, "result": shown, "differs": again.differs, "known": again.known, "changed": changed})
     else:
         _print_again(again, changed)
-    if page is not None and isinstance(again.result, Run):
-        _page(page, again.result, case)
     return NEGATIVE if again.differs else OK
 
 
@@ -193,13 +198,16 @@ def _failure(failure: Failure) -> dict[str, str]:
     return {"kind": failure.kind, "detail": failure.detail, "log": failure.log}
 
 
-def _page(path: Path, run: Run, case: Case) -> None:
+def _page(path: Path, result: Run | Failure, case: Case) -> None:
+    if isinstance(result, Failure):
+        notes.print(f"no report: the run gave no result ({result.kind})", markup=False)
+        return
     try:
         from foreshock.report import write_report
     except ImportError as e:
         raise BadInputError("--report", f"needs {e.name}", "; run: pip install 'foreshock[report]'") from e
-    write_report(path, f"{case.scenario}, arm {case.arm}, seed {case.seed}", [(case.arm, run)])
-    console.print(f"report: {path}", markup=False)
+    write_report(path, f"{case.scenario}, arm {case.arm}, seed {case.seed}", [(case.arm, result)])
+    notes.print(f"report: {path}", markup=False)
 
 
 def _print_again(again: Again, changed: list[str]) -> None:
