@@ -120,6 +120,7 @@ class Robot:
         self.stops: list[str] = []
         self.streaming = streaming
         self.jump_ns = 0
+        self.gid = b"robot-in-a-test-"
         self.guard = Guard("robot", self._take, self.stops.append, self.link, "g1")
         self._ended = threading.Event()
         self._codec, self._sequence = Codec(), 0
@@ -147,7 +148,7 @@ class Robot:
         if sequence is None:
             self._sequence += 1
             sequence = self._sequence
-        return pack_attachment(sequence, stamp_ns, b"robot-in-a-test-")
+        return pack_attachment(sequence, stamp_ns, self.gid)
 
     def ask(self, service: str, payload: bytes = b"") -> bytes | None:
         for reply in self.session.get(self.keys.service(service), payload=payload, timeout=5.0):

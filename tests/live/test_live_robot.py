@@ -136,3 +136,26 @@ def test_a_clock_that_jumps_ends_motion_until_it_is_steady_again(tmp_path: Path)
         until(lambda: (s := robot.status()) and not s.withheld, "it has been steady for 2 s, and is believed again")
         status = until(robot.status, "status")
         assert status.streams["robot/left_gripper/state"].counts.jumps == 1
+
+
+def test_a_clock_set_back_is_age_until_its_sender_begins_again(tmp_path: Path) -> None:
+    """One end cannot tell it from a delay that came at once: old data must not become fresh by waiting."""
+    endpoint, channel = free_endpoint(), "robot/left_gripper/state"
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        robot.jump_ns = -1_000_000_000
+        until(lambda: not robot.guard.permitted(), "nobody moves on old samples")
+        status = until(lambda: (s := robot.status()) and s.streams[channel].delay_s > 0.9 and s, "its delay is seen")
+        assert "link: samples come " in status.health[channel]
+        assert "later than at first" in status.health[channel]
+        uptime_s = status.uptime_s
+        status = until(lambda: (s := robot.status()) and s.uptime_s > uptime_s + 3.0 and s, "longer than any memory")
+        assert status.streams[channel].source_age_s > 0.9
+        assert not robot.guard.permitted()
+        robot.streaming = False
+        until(lambda: (s := robot.status()) and s.streams[channel].arrival_age_s > 1.1, "the sender has ended")
+        robot.gid, robot.streaming = b"another in a tes", True
+        status = until(lambda: (s := robot.status()) and s.streams[channel].delay_s < 0.1 and s, "it is met anew")
+        assert "later than at first" not in status.health.get(channel, "")
+        assert robot.ask("reset", b'{"who": "jane", "why": "clock seen to"}') is not None
+        until(robot.guard.permitted, "the robot may move again")

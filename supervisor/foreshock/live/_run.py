@@ -190,7 +190,6 @@ class LiveSupervisor:
             withheld = "; ".join(f"{twin} is refused: {why}" for twin, why in refused.items())
         if self._missing:
             withheld = f"waiting for {', '.join(self._missing)}"
-        faults = {s.channel: f"link: {s.counts.last_fault}" for s in self._streams if s.counts.last_fault}
         return Status(
             robot=self._run.config.supervisor.robot,
             epoch=self.epoch,
@@ -214,7 +213,7 @@ class LiveSupervisor:
             if d is None
             else tuple(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in d.precursors if p.phase != "cleared"),
             streams={s.channel: stream_status(s, now_ns) for s in self._streams},
-            health={**faults, **self._health, **({"link log": log.fault} if log is not None and log.fault else {})},
+            health=self._not_ok(),
             peers=self._services.peers(),
             links=tuple(
                 sorted(f"{x.dst} {x.auth_identifier or 'without a certificate'}" for x in self._session.info.links())
@@ -223,6 +222,16 @@ class LiveSupervisor:
             refused=() if log is None else log.refused(now_ns),
             journal="" if self._journal is None else str(self._journal.path),
         )
+
+    def _not_ok(self) -> dict[str, str]:
+        """State and reason of every detector and channel that is not ok, with what is wrong with its stream."""
+        found = dict(self._health)
+        for s in self._streams:
+            if s.fault:
+                found[s.channel] = "; ".join([*([found[s.channel]] if s.channel in found else []), f"link: {s.fault}"])
+        if self._denied is not None and self._denied.fault:
+            found["link log"] = self._denied.fault
+        return found
 
     def _names(self) -> dict[str, str]:
         """Names in the certificates of the peers that are connected, by Zenoh id."""

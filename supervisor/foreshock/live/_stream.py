@@ -61,6 +61,8 @@ class Stream:
         max_skew_s: see ClockOffset.
 
     Attributes:
+        offset_ns: of the source's clock; None before the first sample.
+        delay_ns: how much later samples come than its drift explains; see ClockOffset.
         doubted: the source's clock has just jumped, and is not believed yet.
     """
 
@@ -68,10 +70,12 @@ class Stream:
         import zenoh
 
         self.channel, self._cls, self._codec, self._skew_s = channel, cls, codec, max_skew_s
+        self._skew_ns = round(max_skew_s * 1e9)
         self.key = keys.stream(channel, ROS_NAMES[cls])
         self._subscriber = session.declare_subscriber(self.key, zenoh.handlers.RingChannel(RING))
         self.counts = StreamCounts()
         self.offset_ns: int | None = None
+        self.delay_ns = 0
         self.doubted = False
         self.newest_ns = -1
         self.arrived_ns = -1
@@ -123,7 +127,8 @@ class Stream:
             counts.last_fault = f"a stamp {(self._stamp_ns - stamp_ns) / 1e6:.1f} ms before the one before it"
         self._sequence, self._stamp_ns = max(sequence, self._sequence), max(stamp_ns, self._stamp_ns)
         at_ns = self._clock.take(stamp_ns, arrival_ns)
-        counts.jumps, self.offset_ns = self._clock.jumps, self._clock.offset_ns
+        clock = self._clock
+        counts.jumps, self.offset_ns, self.delay_ns = clock.jumps, clock.offset_ns, clock.delay_ns
         self.doubted = at_ns is None
         if at_ns is None:
             counts.unbelieved += 1
@@ -132,6 +137,14 @@ class Stream:
         counts.samples += 1
         self.newest_ns, self.arrived_ns = max(at_ns, self.newest_ns), now_ns
         return Sample(at_ns, self.channel, message, sequence, now_ns)
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with the stream, in words; empty if nothing is."""
+        if self.delay_ns <= self._skew_ns:
+            return self.counts.last_fault
+        late = f"samples come {self.delay_ns / 1e9:.2f} s later than at first, which counts as their age"
+        return f"{late}: a delay has grown, or the sender's clock was set back; when it begins again, it is met anew"
 
     def _belongs(self, gid: bytes, now_ns: int) -> bool:
         """Whether the sample is of the stream's sender; another one takes over when that is silent."""
