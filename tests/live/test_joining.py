@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -31,6 +32,8 @@ GOOD = Hello(
 )
 SLOW = (ChannelNote("left_gripper/state", GRIP, rihs01(GRIP), 1_000_000_000),)
 OTHER = (ChannelNote("left_gripper/state", GRIP, "RIHS01_00", 10_000_000),)
+IMU = "sensor_msgs/msg/Imu"
+WRONG = (ChannelNote("left_gripper/state", IMU, rihs01(IMU), 10_000_000),)
 
 
 def test_a_twin_that_means_something_else_is_refused_by_name(tmp_path: Path) -> None:
@@ -42,6 +45,9 @@ def test_a_twin_that_means_something_else_is_refused_by_name(tmp_path: Path) -> 
         (msgspec.structs.replace(GOOD, clock="simulated"), "clock: 'simulated'"),
         (msgspec.structs.replace(GOOD, channels=OTHER), "has the hash RIHS01_00"),
         (msgspec.structs.replace(GOOD, channels=SLOW), "1 samples a second, a detector needs"),
+        (msgspec.structs.replace(GOOD, channels=WRONG), f"left_gripper/state: '{IMU}', '{GRIP}' is read there"),
+        (msgspec.structs.replace(GOOD, robot="other-robot"), "robot: 'other-robot', 'robot' is expected"),
+        (msgspec.structs.replace(GOOD, robot="other-robot", channels=SLOW), "robot: 'other-robot'"),
     ]
     text = CONFIG.replace('use = "grip"', 'use = "grip"\nconfig = {{ min_rate_hz = 20.0 }}')
     with supervisor(tmp_path, endpoint, text), Robot(endpoint) as robot:
@@ -54,8 +60,9 @@ def test_a_twin_that_means_something_else_is_refused_by_name(tmp_path: Path) -> 
                 token = session.liveliness().declare_token(robot.keys.alive("twin", str(k)))
                 status = until(lambda n=name: (s := robot.status()) and n in s.peers and s, "it is seen")
                 if said:
-                    status = until(lambda: (s := robot.status()) and s.withheld and s, "it is refused")
-                    assert f"{name} is refused" in status.withheld
+                    status = until(
+                        lambda n=name: (s := robot.status()) and f"{n} is refused" in s.withheld and s, "it is refused"
+                    )
                     assert said in status.withheld
                     until(lambda: not robot.guard.permitted(), "nobody moves on its numbers")
                 else:
@@ -64,6 +71,42 @@ def test_a_twin_that_means_something_else_is_refused_by_name(tmp_path: Path) -> 
                 token.undeclare()
                 queryable.undeclare()
             until(robot.guard.permitted, "it has left, the robot may move")
+
+
+def test_a_twin_that_has_not_answered_yet_keeps_all_from_moving(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        key, questions = robot.keys.service("twin/slow"), list[Any]()
+        with open_link(robot.link) as session:
+            queryable = session.declare_queryable(key, questions.append)
+            token = session.liveliness().declare_token(robot.keys.alive("twin", "slow"))
+            status = until(lambda: (s := robot.status()) and s.withheld and s, "the supervisor waits for its answer")
+            assert status.withheld == "twin/slow has not said yet what it is"
+            assert not status.motion_permitted
+            until(lambda: not robot.guard.permitted(), "nobody moves in the meantime")
+            while not robot.guard.permitted():  # it is asked again until it answers
+                for question in [questions.pop() for _ in range(len(questions))]:
+                    question.reply(key, msgspec.json.encode(GOOD))
+                    question.drop()
+                time.sleep(0.01)
+            token.undeclare()
+            queryable.undeclare()
+
+
+def test_more_twins_than_are_asked_keep_all_from_moving(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot, open_link(robot.link) as session:
+        until(robot.guard.permitted, "the robot may move")
+        answer = msgspec.json.encode(GOOD)
+        held: list[Any] = []
+        for k in range(65):
+            key = robot.keys.service(f"twin/{k:02}")
+            held.append(session.declare_queryable(key, lambda q, key=key: q.reply(key, answer)))
+            held.append(session.liveliness().declare_token(robot.keys.alive("twin", f"{k:02}")))
+        said = "twin/64 is refused: there are more than 64 twins"
+        until(lambda: (s := robot.status()) and s.withheld == said, "the last one is refused")
+        until(lambda: not robot.guard.permitted(), "nobody moves")
 
 
 def test_a_robot_on_rmw_zenoh_needs_no_bridge(tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ class LiveSupervisor:
             self._robot = RobotLink(self._session, keys, run.live, self.epoch)
             self._decisions = self._session.declare_publisher(keys.service("decision"))
             self._services = Services(self._session, keys)
-            self._handshakes = Handshakes(self._session, keys, self.supervisor.inputs())
+            self._handshakes = Handshakes(self._session, keys, self.supervisor.inputs(), channels)
             self._tokens = ros_tokens(self._session, keys, "MS", {c: ROS_NAMES[cls] for c, cls in channels.items()})
             self._token = self._session.liveliness().declare_token(keys.alive("supervisor", str(self.epoch)))
             self._began_ns = monotonic_ns()
@@ -150,8 +150,7 @@ class LiveSupervisor:
         self._robot.tell(decision, now_ns)
         self._decision = decision
         self._handshakes.update(self._services.peers(), now_ns)
-        permitted = not (self._robot.overdue(now_ns) or self._handshakes.refused or self._doubted())
-        self._robot.grant(self.supervisor, now_ns, permitted=permitted)
+        self._robot.grant(self.supervisor, now_ns, permitted=not self._withheld(now_ns))
         verdicts = self.supervisor.verdicts_of(decision)
         self._digest.tick(samples, decision, verdicts)
         if self._journal is not None:
@@ -164,6 +163,20 @@ class LiveSupervisor:
         self._publish(decision, now_ns)
         self._answer()
         return decision
+
+    def _withheld(self, now_ns: int) -> str:
+        """Why nobody may move, beside what the decision says; empty if nothing forbids it."""
+        if self._missing:
+            return f"waiting for {', '.join(self._missing)}"
+        if refused := self._handshakes.refused:
+            return "; ".join(f"{twin} is refused: {why}" for twin, why in refused.items())
+        if waiting := self._handshakes.waiting:
+            return "; ".join(f"{twin} has not said yet what it is" for twin in waiting)
+        if doubted := self._doubted():
+            return f"the clock of {', '.join(doubted)} has jumped"
+        if overdue := self._robot.overdue(now_ns):
+            return f"no guard has acknowledged {', '.join(overdue)}"
+        return ""
 
     def _doubted(self) -> list[str]:
         """Streams whose clock has just jumped: nobody moves on them, however old their last believed sample may be."""
@@ -182,14 +195,7 @@ class LiveSupervisor:
     def status(self) -> Status:
         """What there is to say, after the last tick."""
         now_ns, d, log = monotonic_ns(), self._decision, self._denied
-        overdue = self._robot.overdue(now_ns)
-        withheld = f"no guard has acknowledged {', '.join(overdue)}" if overdue else ""
-        if doubted := self._doubted():
-            withheld = f"the clock of {', '.join(doubted)} has jumped"
-        if refused := self._handshakes.refused:
-            withheld = "; ".join(f"{twin} is refused: {why}" for twin, why in refused.items())
-        if self._missing:
-            withheld = f"waiting for {', '.join(self._missing)}"
+        withheld = self._withheld(now_ns)
         return Status(
             robot=self._run.config.supervisor.robot,
             epoch=self.epoch,
@@ -206,7 +212,7 @@ class LiveSupervisor:
             withheld=withheld,
             leases=self._robot.granted,
             guards={name: (now_ns - at) / NS_PER_S for name, at in self._robot.guards.items()},
-            unacknowledged=tuple(overdue),
+            unacknowledged=tuple(self._robot.overdue(now_ns)),
             unknown_actions=self._robot.unknown,
             interventions={} if d is None else {i.action: i.strength for i in d.interventions},
             precursors=()
