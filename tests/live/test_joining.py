@@ -132,6 +132,21 @@ def test_a_robot_on_rmw_zenoh_needs_no_bridge(tmp_path: Path) -> None:
             return False
 
         until(arrived, "its samples arrive")
+        # one with another idea of the type is not read, and named
+        other = key.replace("RIHS01_", "RIHS01_00")
+        now_ns = time.time_ns()
+        ros.put(other, codec.encode(grip, now_ns), attachment=pack_attachment(1, now_ns, b"another robot 00"))
+
+        def named() -> bool:
+            for reply in ros.get(Keys("robot").service("status"), timeout=2.0):
+                if reply.ok is not None:
+                    status = msgspec.json.decode(reply.ok.payload.to_bytes())
+                    counts = status["streams"]["robot/left_gripper/state"]["counts"]
+                    said = f"link: a sample came on {other}, {key} is read"
+                    return counts["mistyped"] == 1 and said in status["health"]["robot/left_gripper/state"]
+            return False
+
+        until(named, "the other hash is counted and named")
         # what it looks for to see us: a node and a subscription in the ROS graph
         tokens = [str(r.ok.key_expr) for r in ros.liveliness().get("@ros2_lv/7/**", timeout=2.0) if r.ok is not None]
         assert any(t.endswith("/0/0/NN/%/%/foreshock") for t in tokens)
