@@ -48,12 +48,15 @@ def test_a_twin_that_means_something_else_is_refused_by_name(tmp_path: Path) -> 
         (msgspec.structs.replace(GOOD, channels=WRONG), f"left_gripper/state: '{IMU}', '{GRIP}' is read there"),
         (msgspec.structs.replace(GOOD, robot="other-robot"), "robot: 'other-robot', 'robot' is expected"),
         (msgspec.structs.replace(GOOD, robot="other-robot", channels=SLOW), "robot: 'other-robot'"),
+        (b'{"robot": "\xff"}', "'utf-8' codec can't decode"),
+        (msgspec.json.encode(GOOD).replace(b"10000000}", b"9" * 400 + b"}"), "too large"),
+        (msgspec.json.encode(GOOD) + b" " * 100_000, "bytes, at most 100000 are read"),
     ]
     text = CONFIG.replace('use = "grip"', 'use = "grip"\nconfig = {{ min_rate_hz = 20.0 }}')
     with supervisor(tmp_path, endpoint, text), Robot(endpoint) as robot:
         until(robot.guard.permitted, "the robot may move")
         for k, (hello, said) in enumerate(cases):
-            name, answer = f"twin/{k}", msgspec.json.encode(hello)
+            name, answer = f"twin/{k}", hello if isinstance(hello, bytes) else msgspec.json.encode(hello)
             key = robot.keys.service(name)
             with open_link(robot.link) as session:
                 queryable = session.declare_queryable(key, lambda q, key=key, answer=answer: q.reply(key, answer))

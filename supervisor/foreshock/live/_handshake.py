@@ -14,6 +14,7 @@ from foreshock.wire import ROS_NAMES, Hello, Keys, Request, check_hello
 __all__ = ["Handshakes"]
 
 MOST = 64
+MOST_BYTES = 100_000
 PATIENCE_NS = 5_000_000_000
 
 
@@ -89,12 +90,14 @@ class Handshakes:
         try:
             if reply.ok is None:
                 raise WireError(twin, f"answers: {reply.err.payload.to_string()}")
+            if len(reply.ok.payload) > MOST_BYTES:
+                raise WireError(twin, f"{len(reply.ok.payload)} bytes, at most {MOST_BYTES} are read")
             hello = msgspec.json.decode(reply.ok.payload.to_bytes(), type=Hello)
             check_hello(hello, twin, stepped=False)
             check_streams(hello, twin, self._keys.robot, self._types)
             check_rates(hello, twin, self._rates)
-        except (WireError, msgspec.MsgspecError) as e:
-            self.refused[twin] = str(e)
+        except (WireError, ValueError, OverflowError) as e:  # no JSON, no UTF-8, a number beyond any
+            self.refused[twin] = f"{e!s:.500}"
 
 
 def check_streams(hello: Hello, place: str, robot: str, read: Mapping[str, str]) -> None:
