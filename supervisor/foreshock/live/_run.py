@@ -174,6 +174,8 @@ class LiveSupervisor:
             return "; ".join(f"{twin} has not said yet what it is" for twin in waiting)
         if doubted := self._doubted():
             return f"the clock of {', '.join(doubted)} has jumped"
+        if twice := self._robot.twice(now_ns):
+            return f"two guards are called {', '.join(map(repr, twice))}, or it has begun again within 1 s"
         if overdue := self._robot.overdue(now_ns):
             return f"no guard has acknowledged {', '.join(overdue)}"
         return ""
