@@ -15,7 +15,7 @@ from robot import CONFIG, Robot, free_endpoint, supervisor, until
 
 from foreshock.link import LinkSettings, open_link
 from foreshock.messages import GripState
-from foreshock.wire import ChannelNote, Codec, Hello, Keys, dds_name, pack_attachment, rihs01
+from foreshock.wire import ChannelNote, Codec, Hello, Keys, dds_name, decode_ros, pack_attachment, rihs01
 
 pytest.importorskip("zenoh")
 GRIP = "foreshock_msgs/msg/GripState"
@@ -77,6 +77,8 @@ def test_a_twin_that_means_something_else_is_refused_by_name(tmp_path: Path) -> 
 
 
 def test_a_twin_that_has_not_answered_yet_keeps_all_from_moving(tmp_path: Path) -> None:
+    import zenoh
+
     endpoint = free_endpoint()
     with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
         until(robot.guard.permitted, "the robot may move")
@@ -88,6 +90,10 @@ def test_a_twin_that_has_not_answered_yet_keeps_all_from_moving(tmp_path: Path) 
             assert status.withheld == "twin/slow has not said yet what it is"
             assert not status.motion_permitted
             until(lambda: not robot.guard.permitted(), "nobody moves in the meantime")
+            subscriber = session.declare_subscriber(robot.keys.service("decision"), zenoh.handlers.RingChannel(1))
+            decision = until(subscriber.try_recv, "a decision").payload.to_bytes()
+            health = decode_ros("foreshock_msgs/msg/Decision", decision).health
+            assert health == ["lease: withheld: twin/slow has not said yet what it is"]
             while not robot.guard.permitted():  # it is asked again until it answers
                 for question in [questions.pop() for _ in range(len(questions))]:
                     question.reply(key, msgspec.json.encode(GOOD))

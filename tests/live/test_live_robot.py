@@ -12,9 +12,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from foreshock.link import open_link
 from foreshock.messages import GripState
 from foreshock.session.replay import replay
-from foreshock.wire import Codec
+from foreshock.wire import Codec, decode_ros
 
 sys.path.append(str(Path(__file__).parent))
 from robot import Robot, free_endpoint, supervisor, until
@@ -137,6 +138,28 @@ def test_every_kind_of_fault_is_counted_and_named_by_itself_and_stops_nothing(tm
         is_counted(later, robot.attachment(stamp_ns), "a stamp that its clock's offset", unbelieved=1)
         status = until(robot.status, "a status")
         until(lambda: (s := robot.status()) and s.tick > status.tick + 50, "it ticks on")
+
+
+def test_who_comes_late_reads_in_a_decision_what_is_not_ok(tmp_path: Path) -> None:
+    import zenoh
+
+    endpoint, channel = free_endpoint(), "robot/left_gripper/state"
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        robot.put(b"garbage", robot.attachment(time.time_ns()))
+        robot.streaming = False
+        until(lambda: not robot.guard.permitted(), "nobody moves on a stream that has ended")
+        status = until(lambda: (s := robot.status()) and "grip" in s.health and s, "the status says why")
+        time.sleep(0.5)  # nothing changes any more
+        with open_link(robot.link) as session:
+            late = session.declare_subscriber(robot.keys.service("decision"), zenoh.handlers.RingChannel(1))
+            raw = until(late.try_recv, "a decision")
+            decision = decode_ros("foreshock_msgs/msg/Decision", raw.payload.to_bytes())
+        assert "grip-micro-slip" in decision.unobserved
+        said = dict(line.split(": ", 1) for line in decision.health)
+        assert said.keys() == status.health.keys() == {"grip", channel}
+        assert said["grip"].startswith(f"unobserved: {channel} is ")
+        assert said[channel].startswith("link: foreshock_msgs/msg/GripState: begins with 67617262")
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])

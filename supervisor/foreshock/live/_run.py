@@ -258,7 +258,10 @@ class LiveSupervisor:
         if not due and level == self._level:
             return
         self._level, self._published_ns = level, now_ns
-        data = decision_bytes(decision, self.epoch, self._digest.digest)
+        health = self._not_ok()
+        if withheld := self._withheld(now_ns):
+            health["lease"] = f"withheld: {withheld}"
+        data = decision_bytes(decision, self.epoch, self._digest.digest, health)
         self._decisions.put(data)
         self._history.append((now_ns, data))
         while self._history and now_ns - self._history[0][0] > self._run.live.history_s * NS_PER_S:
