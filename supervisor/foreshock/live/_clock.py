@@ -28,7 +28,8 @@ class ClockOffset:
     DRIFT_PPM passes for drift.
 
     A clock set forward by more than max_skew_s is not believed at all until it has been steady for window_s: a single
-    wrong stamp must not make all others look old. In the first window_s everything is believed.
+    wrong stamp must not make all others look old. In the first window_s everything is believed, and a wrong stamp ahead
+    does make all later ones look old.
 
     Args:
         max_skew_s: how far a stamp may be ahead of the estimate.
