@@ -121,9 +121,10 @@ class Robot:
         self.stops: list[str] = []
         self.streaming = streaming
         self.jump_ns = 0
+        self.gid = b"robot-in-a-test-"
         self.guard = Guard("robot", self._take, self.stops.append, self.link, "g1")
         self._ended = threading.Event()
-        self._codec, self._sequence = Codec(), 0
+        self._codec, self.sequence = Codec(), 0
 
     def __enter__(self) -> Robot:
         self.session: Any = open_link(self.link)
@@ -146,9 +147,9 @@ class Robot:
 
     def attachment(self, stamp_ns: int, sequence: int | None = None) -> bytes:
         if sequence is None:
-            self._sequence += 1
-            sequence = self._sequence
-        return pack_attachment(sequence, stamp_ns, b"robot-in-a-test-")
+            self.sequence += 1
+            sequence = self.sequence
+        return pack_attachment(sequence, stamp_ns, self.gid)
 
     def ask(self, service: str, payload: bytes = b"") -> bytes | None:
         for reply in self.session.get(self.keys.service(service), payload=payload, timeout=5.0):

@@ -117,3 +117,24 @@ def test_every_guard_must_acknowledge(tmp_path: Path) -> None:
             ended.set()
             thread.join()
         until(lambda: (s := robot.status()) and not s.unacknowledged, "it is gone: it holds no lease any more")
+
+
+def test_two_guards_of_one_name_keep_each_other_from_moving(tmp_path: Path) -> None:
+    """What one acknowledges says nothing of the other, and the supervisor knows them by their name."""
+    endpoint = free_endpoint()
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        with Guard("robot", lambda _: True, lambda _: None, robot.link, "g1") as second:
+            until(lambda: not robot.guard.permitted(), "the first may not move")
+            status = until(lambda: (s := robot.status()) and s.withheld and s, "the status says why")
+            assert status.withheld == "two guards are called 'g1', or it has begun again within 1 s"
+            assert not status.motion_permitted
+            leases = (robot.guard.counts.leases, second.counts.leases)
+            tick = status.tick
+            until(lambda: (s := robot.status()) and s.tick > tick + 100, "neither gets a lease for a second")
+            assert (robot.guard.counts.leases, second.counts.leases) == leases
+            assert not second.permitted()
+        until(robot.guard.permitted, "the second has gone")
+        with Guard("robot", lambda _: True, lambda _: None, robot.link, "g2") as second:
+            until(second.permitted, "one of another name may move")
+            assert robot.guard.permitted()

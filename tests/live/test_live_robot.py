@@ -12,9 +12,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from foreshock.link import open_link
 from foreshock.messages import GripState
 from foreshock.session.replay import replay
-from foreshock.wire import Codec
+from foreshock.wire import Codec, decode_ros
 
 sys.path.append(str(Path(__file__).parent))
 from robot import Robot, free_endpoint, supervisor, until
@@ -72,41 +73,93 @@ def test_an_operator_of_a_supervisor_that_waits_is_told(tmp_path: Path) -> None:
         until(robot.guard.permitted, "the robot may move")
 
 
-def test_garbage_of_every_kind_is_counted_and_stops_nothing(tmp_path: Path) -> None:
-    endpoint = free_endpoint()
-    codec = Codec()
+def test_every_kind_of_fault_is_counted_and_named_by_itself_and_stops_nothing(tmp_path: Path) -> None:
+    endpoint, channel, codec = free_endpoint(), "robot/left_gripper/state", Codec()
     grip = GripState(True, 20.0, 5.0, 0.05, 20.0, 0.5, 0.0)
     with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
         until(robot.guard.permitted, "the robot may move")
-        good = codec.encode(grip, time.time_ns())
-        for payload in (b"", b"\x00", os.urandom(200), good[:20], bytes(1_200_000), b"\x00\x00" + good[2:]):
-            robot.put(payload, robot.attachment(time.time_ns()))
-        robot.put(good, None)
-        robot.put(good, b"short")
+        time.sleep(2.5)  # in its first 2 s a clock is believed whatever it does
+        robot.streaming = False
+        time.sleep(0.1)
 
-        def seen() -> bool:
-            s = robot.status()
-            return s is not None and s.streams["robot/left_gripper/state"].counts.garbage >= 8
+        def counts() -> dict[str, int]:
+            found = msgspec.structs.asdict(until(robot.status, "a status").streams[channel].counts)
+            return {name: n for name, n in found.items() if name not in ("last_fault", "jumps", "samples")}
 
-        until(seen, "eight payloads are counted as garbage")
-        now_ns = time.time_ns()
-        twice = robot.attachment(now_ns)
-        robot.put(codec.encode(grip, now_ns), twice)
-        robot.put(codec.encode(grip, now_ns), twice)
-        robot.put(codec.encode(grip, now_ns - 1_000_000_000), robot.attachment(now_ns - 1_000_000_000))
-        robot._sequence += 5
-        nan = msgspec.structs.replace(grip, normal_force=float("nan"))
-        robot.put(codec.encode(nan, time.time_ns()), robot.attachment(time.time_ns()))
+        def is_counted(payload: bytes, attachment: bytes | None, words: str, **more: int) -> None:
+            """It adds this much to these counts and nothing to others, and health says why."""
+            before = counts()
+            expected = {name: n + more.pop(name, 0) for name, n in before.items()}
+            assert not more
+            robot.put(payload, attachment)
+            until(lambda: counts() == expected, f"{words}: {expected} after {before}")
+            assert f"link: {words}" in until(robot.status, "a status").health[channel]
 
-        def counted() -> bool:
-            s = robot.status()
-            counts = s.streams["robot/left_gripper/state"].counts if s is not None else None
-            return counts is not None and min(counts.repeated, counts.backwards, counts.gaps) >= 1
+        def now(grip: GripState = grip, after_ns: int = 0) -> tuple[bytes, int]:
+            stamp_ns = time.time_ns() + after_ns
+            return codec.encode(grip, stamp_ns), stamp_ns
 
-        until(counted, "repeated, backwards and missing samples are counted")
+        good, stamp_ns = now()
+        robot.put(good, robot.attachment(stamp_ns))
+        kind = "foreshock_msgs/msg/GripState"
+        for payload, words in (
+            (b"", f"{kind}: begins with nothing"),
+            (b"\x00", f"{kind}: begins with 00"),
+            (b"\x00\x01\x00\x00" + b"\xff" * 7, f"{kind}: cannot be decoded"),
+            (good[:20], f"{kind}: cannot be decoded"),
+            (b"\x00\x00" + good[2:], f"{kind}: begins with 00000000"),
+            (bytes(1_200_000), f"{channel}: 1200000 bytes, at most 250000 are read"),
+        ):
+            is_counted(payload, robot.attachment(stamp_ns, robot.sequence + 1), words, garbage=1)
+        is_counted(good, None, "attachment: missing", garbage=1)
+        is_counted(good, b"short", "attachment: 5 bytes", garbage=1)
+        is_counted(good, robot.attachment(stamp_ns, robot.sequence), "the number", repeated=1)
+        last = robot.sequence
+        later, stamp_ns = now()
+        is_counted(later, robot.attachment(stamp_ns, last), f"the number {last} came twice", repeated=1)
+        later, stamp_ns = now()
+        words = f"the number {last - 1} came after {last}"
+        is_counted(later, robot.attachment(stamp_ns, last - 1), words, disordered=1)
+        older, older_ns = now(after_ns=-2_000_000_000)
+        is_counted(older, robot.attachment(older_ns), "a stamp ", backwards=1)
+        robot.sequence += 5
+        later, stamp_ns = now()
+        is_counted(later, robot.attachment(stamp_ns), "", gaps=5)
+        for value in (float("nan"), float("inf"), float("-inf")):
+            later, stamp_ns = now(msgspec.structs.replace(grip, normal_force=value))
+            words = "a GripState with a number that is not finite"
+            is_counted(later, robot.attachment(stamp_ns), words, not_finite=1)
+        later, stamp_ns = now()
+        robot.gid, own = b"another in a tes", robot.gid
+        is_counted(later, robot.attachment(stamp_ns), "a second sender", foreign=1)
+        robot.gid = own
+        robot.sequence -= 1
+        later, stamp_ns = now(after_ns=10_000_000_000)
+        is_counted(later, robot.attachment(stamp_ns), "a stamp that its clock's offset", unbelieved=1)
         status = until(robot.status, "a status")
-        assert "robot/left_gripper/state" in status.health
         until(lambda: (s := robot.status()) and s.tick > status.tick + 50, "it ticks on")
+
+
+def test_who_comes_late_reads_in_a_decision_what_is_not_ok(tmp_path: Path) -> None:
+    import zenoh
+
+    endpoint, channel = free_endpoint(), "robot/left_gripper/state"
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        robot.put(b"garbage", robot.attachment(time.time_ns()))
+        robot.streaming = False
+        until(lambda: not robot.guard.permitted(), "nobody moves on a stream that has ended")
+        status = until(lambda: (s := robot.status()) and "grip" in s.health and s, "the status says why")
+        time.sleep(0.5)  # nothing changes any more
+        with open_link(robot.link) as session:
+            late = session.declare_subscriber(robot.keys.service("decision"), zenoh.handlers.RingChannel(1))
+            raw = until(late.try_recv, "a decision")
+            decision = decode_ros("foreshock_msgs/msg/Decision", raw.payload.to_bytes())
+        assert "grip-micro-slip" in decision.unobserved
+        said = dict(line.split(": ", 1) for line in decision.health)
+        assert said.keys() == status.health.keys() == {"grip", channel}
+        assert said["grip"].startswith(f"unobserved: {channel} is ")
+        assert said[channel].startswith("link: foreshock_msgs/msg/GripState: begins with 67617262")
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
@@ -136,3 +189,26 @@ def test_a_clock_that_jumps_ends_motion_until_it_is_steady_again(tmp_path: Path)
         until(lambda: (s := robot.status()) and not s.withheld, "it has been steady for 2 s, and is believed again")
         status = until(robot.status, "status")
         assert status.streams["robot/left_gripper/state"].counts.jumps == 1
+
+
+def test_a_clock_set_back_is_age_until_its_sender_begins_again(tmp_path: Path) -> None:
+    """One end cannot tell it from a delay that came at once: old data must not become fresh by waiting."""
+    endpoint, channel = free_endpoint(), "robot/left_gripper/state"
+    with supervisor(tmp_path, endpoint), Robot(endpoint) as robot:
+        until(robot.guard.permitted, "the robot may move")
+        robot.jump_ns = -1_000_000_000
+        until(lambda: not robot.guard.permitted(), "nobody moves on old samples")
+        status = until(lambda: (s := robot.status()) and s.streams[channel].delay_s > 0.9 and s, "its delay is seen")
+        assert "link: samples come " in status.health[channel]
+        assert "later than at first" in status.health[channel]
+        uptime_s = status.uptime_s
+        status = until(lambda: (s := robot.status()) and s.uptime_s > uptime_s + 3.0 and s, "longer than any memory")
+        assert status.streams[channel].source_age_s > 0.9
+        assert not robot.guard.permitted()
+        robot.streaming = False
+        until(lambda: (s := robot.status()) and s.streams[channel].arrival_age_s > 1.1, "the sender has ended")
+        robot.gid, robot.streaming = b"another in a tes", True
+        status = until(lambda: (s := robot.status()) and s.streams[channel].delay_s < 0.1 and s, "it is met anew")
+        assert "later than at first" not in status.health.get(channel, "")
+        assert robot.ask("reset", b'{"who": "jane", "why": "clock seen to"}') is not None
+        until(robot.guard.permitted, "the robot may move again")

@@ -56,7 +56,7 @@ class Guard:
         on_minimal_risk: called once when the lease expires, with the reason, from the guard's own thread. The control
             loop polls permitted() besides: whichever is first.
         link: how to reach the supervisor; the default is this machine's.
-        name: of this guard, unique for the robot.
+        name: of this guard, unique for the robot: while two have one name, neither gets a lease.
         period_s: how often it asks for a lease.
         max_ttl_s: a lease that wants to live longer is refused.
         base: folder that the paths of certificates start from.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,15 @@ from foreshock.wire import encode_ros, ros_header, ros_type
 __all__ = ["decision_bytes"]
 
 
-def decision_bytes(d: Decision, epoch: int, digest: str) -> bytes:
-    """A decision as CDR; its stamp is on the supervisor's timeline."""
+def decision_bytes(d: Decision, epoch: int, digest: str, health: Mapping[str, str]) -> bytes:
+    """A decision as CDR; its stamp is on the supervisor's timeline.
+
+    Args:
+        d: to publish.
+        epoch: of the supervisor.
+        digest: of all decisions up to this one.
+        health: state and reason of whatever is not ok, by source; the decision's own lists changes only.
+    """
     modes = sorted(d.levels)
     precursor, intervention = ros_type("foreshock_msgs/msg/Precursor"), ros_type("foreshock_msgs/msg/Intervention")
     message = ros_type("foreshock_msgs/msg/Decision")(
@@ -37,6 +45,7 @@ def decision_bytes(d: Decision, epoch: int, digest: str) -> bytes:
         trust_by_mode=np.array([d.trust.control_by_mode.get(m, math.nan) for m in modes]),
         level_by_mode=np.array([int(d.levels[m]) for m in modes], np.uint8),
         unobserved=list(d.trust.unobserved),
+        health=[f"{source}: {said}" for source, said in sorted(health.items())],
         precursors=[
             precursor(
                 kind=p.kind,

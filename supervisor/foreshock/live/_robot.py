@@ -23,6 +23,8 @@ from foreshock.wire import Keys
 __all__ = ["RobotLink"]
 
 RING = 64
+TWICE_NS = 1_000_000_000
+"""Nobody moves for so long after the nonces of a guard that is there went back."""
 
 
 class Pending(msgspec.Struct):
@@ -35,10 +37,11 @@ class Pending(msgspec.Struct):
 
 
 class Asking(msgspec.Struct):
-    """A guard: when it was heard last, and the nonce of its last request."""
+    """A guard: when it was heard last, the nonce of its last request, and when its nonces went back last."""
 
     heard_ns: int
     nonce: int
+    twice_ns: int = -TWICE_NS
 
 
 class RobotLink:
@@ -84,6 +87,13 @@ class RobotLink:
         """Actions that a guard has not acknowledged in time: the robot may not know of them."""
         limit_ns = round(self._settings.ack_s * 1e9)
         return [action for action, p in self._pending.items() if now_ns - p.first_ns > limit_ns]
+
+    def twice(self, now_ns: int) -> list[str]:
+        """Guards whose nonces went back though they had just been heard: two of one name, or one that began again.
+
+        An acknowledgement names its guard, so that one of two would answer for both.
+        """
+        return [name for name, guard in self._guards.items() if now_ns - guard.twice_ns < TWICE_NS]
 
     def tell(self, decision: Decision, now_ns: int) -> None:
         """Send what changed, and again what a guard has not acknowledged."""
@@ -151,7 +161,7 @@ class RobotLink:
                 continue
             self._meet(request, now_ns)
             lease = supervisor.lease(request.nonce, request.guard_ns, now_ns, self._settings.ttl_s)
-            if permitted and lease is not None:
+            if permitted and lease is not None and not self.twice(now_ns):
                 self.granted += 1
                 self._lease.put(pack_lease(lease))
 
@@ -159,9 +169,13 @@ class RobotLink:
         known = self._guards.get(request.guard)
         if known is None and len(self._guards) >= RING:
             del self._guards[min(self._guards, key=lambda g: self._guards[g].heard_ns)]
-        self._guards[request.guard] = Asking(now_ns, request.nonce)
-        if known is not None and request.nonce > known.nonce and now_ns - known.heard_ns <= self._ttl_ns:
-            return
+        asking = self._guards[request.guard] = Asking(now_ns, request.nonce)
+        if known is not None:
+            asking.twice_ns = known.twice_ns
+            if now_ns - known.heard_ns <= self._ttl_ns:
+                if request.nonce > known.nonce:
+                    return
+                asking.twice_ns = now_ns
         for action, numbered in self._active.items():
             pending = self._pending.setdefault(action, Pending(numbered, now_ns, now_ns, set()))
             pending.by.discard(request.guard)

@@ -24,7 +24,7 @@ from foreshock.live._intake import Intake
 from foreshock.live._journal import SegmentedJournal
 from foreshock.live._publish import decision_bytes
 from foreshock.live._robot import RobotLink
-from foreshock.live._services import Services
+from foreshock.live._services import MOST_PEERS, Services
 from foreshock.live._status import Status, TickTimes, stream_status
 from foreshock.live._stream import Stream
 from foreshock.recording import Head, McapJournal, check_writable
@@ -85,7 +85,7 @@ class LiveSupervisor:
             self._robot = RobotLink(self._session, keys, run.live, self.epoch)
             self._decisions = self._session.declare_publisher(keys.service("decision"))
             self._services = Services(self._session, keys)
-            self._handshakes = Handshakes(self._session, keys, self.supervisor.inputs())
+            self._handshakes = Handshakes(self._session, keys, self.supervisor.inputs(), channels)
             self._tokens = ros_tokens(self._session, keys, "MS", {c: ROS_NAMES[cls] for c, cls in channels.items()})
             self._token = self._session.liveliness().declare_token(keys.alive("supervisor", str(self.epoch)))
             self._began_ns = monotonic_ns()
@@ -161,8 +161,7 @@ class LiveSupervisor:
         self._robot.tell(decision, now_ns)
         self._decision = decision
         self._handshakes.update(self._services.peers(), now_ns)
-        permitted = not (self._robot.overdue(now_ns) or self._handshakes.refused or self._doubted() or self.unrecorded)
-        self._robot.grant(self.supervisor, now_ns, permitted=permitted)
+        self._robot.grant(self.supervisor, now_ns, permitted=not self._withheld(now_ns))
         verdicts = self.supervisor.verdicts_of(decision)
         self._digest.tick(samples, decision, verdicts)
         with self._recording():
@@ -185,6 +184,26 @@ class LiveSupervisor:
         except BadInputError as e:
             self.unrecorded, self._journal = str(e), None
 
+    def _withheld(self, now_ns: int) -> str:
+        """Why nobody may move, beside what the decision says; empty if nothing forbids it."""
+        if self._missing:
+            return f"waiting for {', '.join(self._missing)}"
+        if self.unrecorded:
+            return self.unrecorded
+        if refused := self._handshakes.refused:
+            return "; ".join(f"{twin} is refused: {why}" for twin, why in refused.items())
+        if waiting := self._handshakes.waiting:
+            return "; ".join(f"{twin} has not said yet what it is" for twin in waiting)
+        if self._services.crowded:
+            return f"more than {MOST_PEERS} peers are there, and what the others are is not known"
+        if doubted := self._doubted():
+            return f"the clock of {', '.join(doubted)} has jumped"
+        if twice := self._robot.twice(now_ns):
+            return f"two guards are called {', '.join(map(repr, twice))}, or it has begun again within 1 s"
+        if overdue := self._robot.overdue(now_ns):
+            return f"no guard has acknowledged {', '.join(overdue)}"
+        return ""
+
     def _doubted(self) -> list[str]:
         """Streams whose clock has just jumped: nobody moves on them, however old their last believed sample may be."""
         return [s.channel for s in self._streams if s.doubted and (s.channel in self._needed or not self._needed)]
@@ -202,16 +221,7 @@ class LiveSupervisor:
     def status(self) -> Status:
         """What there is to say, after the last tick."""
         now_ns, d, log = monotonic_ns(), self._decision, self._denied
-        overdue = self._robot.overdue(now_ns)
-        withheld = f"no guard has acknowledged {', '.join(overdue)}" if overdue else ""
-        if doubted := self._doubted():
-            withheld = f"the clock of {', '.join(doubted)} has jumped"
-        if refused := self._handshakes.refused:
-            withheld = "; ".join(f"{twin} is refused: {why}" for twin, why in refused.items())
-        withheld = self.unrecorded or withheld
-        if self._missing:
-            withheld = f"waiting for {', '.join(self._missing)}"
-        faults = {s.channel: f"link: {s.counts.last_fault}" for s in self._streams if s.counts.last_fault}
+        withheld = self._withheld(now_ns)
         return Status(
             robot=self._run.config.supervisor.robot,
             epoch=self.epoch,
@@ -228,14 +238,14 @@ class LiveSupervisor:
             withheld=withheld,
             leases=self._robot.granted,
             guards={name: (now_ns - at) / NS_PER_S for name, at in self._robot.guards.items()},
-            unacknowledged=tuple(overdue),
+            unacknowledged=tuple(self._robot.overdue(now_ns)),
             unknown_actions=self._robot.unknown,
             interventions={} if d is None else {i.action: i.strength for i in d.interventions},
             precursors=()
             if d is None
             else tuple(f"{p.kind}@{p.subject}" if p.subject else p.kind for p in d.precursors if p.phase != "cleared"),
             streams={s.channel: stream_status(s, now_ns) for s in self._streams},
-            health={**faults, **self._health, **({"link log": log.fault} if log is not None and log.fault else {})},
+            health=self._not_ok(),
             peers=self._services.peers(),
             links=tuple(
                 sorted(f"{x.dst} {x.auth_identifier or 'without a certificate'}" for x in self._session.info.links())
@@ -244,6 +254,16 @@ class LiveSupervisor:
             refused=() if log is None else log.refused(now_ns),
             journal="" if self._journal is None else str(self._journal.path),
         )
+
+    def _not_ok(self) -> dict[str, str]:
+        """State and reason of every detector and channel that is not ok, with what is wrong with its stream."""
+        found = dict(self._health)
+        for s in self._streams:
+            if s.fault:
+                found[s.channel] = "; ".join([*([found[s.channel]] if s.channel in found else []), f"link: {s.fault}"])
+        if self._denied is not None and self._denied.fault:
+            found["link log"] = self._denied.fault
+        return found
 
     def _names(self) -> dict[str, str]:
         """Names in the certificates of the peers that are connected, by Zenoh id."""
@@ -263,7 +283,10 @@ class LiveSupervisor:
         if not due and level == self._level:
             return
         self._level, self._published_ns = level, now_ns
-        data = decision_bytes(decision, self.epoch, self._digest.digest)
+        health = self._not_ok()
+        if withheld := self._withheld(now_ns):
+            health["lease"] = f"withheld: {withheld}"
+        data = decision_bytes(decision, self.epoch, self._digest.digest, health)
         self._decisions.put(data)
         self._history.append((now_ns, data))
         while self._history and now_ns - self._history[0][0] > self._run.live.history_s * NS_PER_S:

@@ -74,7 +74,7 @@ class SteppedServer:
                     continue
                 try:
                     query.reply(query.key_expr, self.answer(query.payload.to_bytes() if query.payload else b""))
-                except (ForeshockError, msgspec.MsgspecError) as e:
+                except (ForeshockError, msgspec.MsgspecError, UnicodeDecodeError) as e:
                     query.reply_err(f"{type(e).__name__}: {e}".encode())
                 query.drop()
         finally:
@@ -85,7 +85,7 @@ class SteppedServer:
 
         Raises:
             ForeshockError: the twin failed, or the question makes no sense.
-            msgspec.MsgspecError: it is no question.
+            msgspec.MsgspecError, UnicodeDecodeError: it is no question.
         """
         request = msgspec.json.decode(payload, type=Request)
         if request.op == "hello":

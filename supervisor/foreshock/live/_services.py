@@ -16,12 +16,16 @@ from foreshock.supervisor import Supervisor
 from foreshock.taxonomy import Taxonomy
 from foreshock.wire import Keys
 
-__all__ = ["ResetRequest", "Services"]
+__all__ = ["MOST_PEERS", "ResetRequest", "Services"]
 
 RING = 16
 AT_ONCE = 4
 """Questions of a kind that are answered in one tick; the others wait in their ring."""
-MOST_BYTES = 10_000
+MOST_BYTES = 1_000
+MOST_PEERS = 256
+"""Tokens that are kept."""
+MOST_LETTERS = 100
+"""Of a name of a dimension, and of what is wrong with a question: no more is looked up, or said of it."""
 
 
 class ResetRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -38,21 +42,24 @@ class Services:
     Args:
         session: open Zenoh session.
         keys: of the robot.
+
+    Attributes:
+        crowded: there were once more peers than are kept, so that twins may be unknown.
     """
 
     def __init__(self, session: Any, keys: Keys) -> None:
         import zenoh
 
+        self.crowded = False
         self._asked = {
             name: session.declare_queryable(keys.service(name), zenoh.handlers.RingChannel(RING))
             for name in ("status", "taxonomy", "config", "history", "reset")
         }
         self._tokens = session.liveliness().declare_subscriber(
-            keys.alive("**", "").rstrip("/"), zenoh.handlers.RingChannel(256), history=True
+            keys.alive("**", "").rstrip("/"), zenoh.handlers.RingChannel(4 * MOST_PEERS), history=True
         )
         self._alive: dict[str, None] = {}
         self._lost: type[Exception] = zenoh.ZError
-        self._drop = zenoh.CongestionControl.DROP
         self._put = zenoh.SampleKind.PUT
 
     def peers(self) -> tuple[str, ...]:
@@ -60,8 +67,10 @@ class Services:
         while (token := self._tokens.try_recv()) is not None:
             name = str(token.key_expr).partition("/@/alive/")[2]
             if token.kind == self._put:
-                if len(self._alive) < 256:
-                    self._alive[name] = None
+                self._alive[name] = None
+                if len(self._alive) > MOST_PEERS:
+                    del self._alive[name]
+                    self.crowded = True
             else:
                 self._alive.pop(name, None)
         return tuple(sorted(self._alive))
@@ -69,18 +78,15 @@ class Services:
     def resets(self, supervisor: Supervisor, now_ns: int) -> Iterator[OperatorReset]:
         """Do what operators ask for; the records."""
         for query in _taken(self._asked["reset"]):
-            payload = query.payload.to_bytes() if query.payload is not None else b""
             try:
-                if len(payload) > MOST_BYTES:
-                    raise BadInputError("reset", f"{len(payload)} bytes")
-                request = msgspec.json.decode(payload, type=ResetRequest)
+                request = _reset_of(query.payload)
                 record = supervisor.operator_reset(request.who, request.why, now_ns, request.dimension)
-            except (BadInputError, msgspec.MsgspecError) as e:
+            except BadInputError as e:
                 with suppress(self._lost):
                     query.reply_err(str(e).encode())
             else:
                 with suppress(self._lost):  # it is done and recorded, even where nobody waits for the answer
-                    query.reply(query.key_expr, msgspec.json.encode(record), congestion_control=self._drop)
+                    query.reply(query.key_expr, msgspec.json.encode(record))
                 yield record
             query.drop()
 
@@ -108,16 +114,36 @@ class Services:
         }
         for name, give in answers.items():
             answer = None
-            for query in _taken(self._asked[name], AT_ONCE):
+            for query in _taken(self._asked[name]):
                 answer = give() if answer is None else answer
-                # a peer that asks and takes no answer must not keep the tick waiting
                 with suppress(self._lost):
-                    query.reply(query.key_expr, answer, congestion_control=self._drop)
+                    query.reply(query.key_expr, answer)
                 query.drop()
 
 
-def _taken(queryable: Any, most: int = RING) -> Iterator[Any]:
-    for _ in range(most):
+def _reset_of(payload: Any) -> ResetRequest:
+    """What an operator asks.
+
+    Raises:
+        BadInputError: it is too long or no such request; it does not repeat what a peer may have made long.
+    """
+    size = 0 if payload is None else len(payload)
+    if size > MOST_BYTES:
+        raise BadInputError("reset", f"{size} bytes, at most {MOST_BYTES} are read")
+    try:
+        request = msgspec.json.decode(payload.to_bytes() if size else b"", type=ResetRequest)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as e:
+        problem = str(e)
+        if len(problem) > MOST_LETTERS:
+            problem = "it is no JSON object of who, why and dimension"
+        raise BadInputError("reset", problem) from None
+    if len(request.dimension) > MOST_LETTERS:
+        raise BadInputError("reset.dimension", f"{len(request.dimension)} letters, at most {MOST_LETTERS} are read")
+    return request
+
+
+def _taken(queryable: Any) -> Iterator[Any]:
+    for _ in range(AT_ONCE):
         query = queryable.try_recv()
         if query is None:
             return

@@ -13,12 +13,22 @@ __all__ = ["Status", "StreamStatus", "TickTimes", "stream_status"]
 
 
 class StreamStatus(msgspec.Struct, frozen=True):
-    """Of one stream: key, ages of the newest sample by source and arrival (s; None: nothing yet), offset, counts."""
+    """Of one stream.
+
+    Attributes:
+        key: of its samples.
+        source_age_s: age of the newest sample by its own stamp; None: there is none yet.
+        arrival_age_s: and by its arrival.
+        clock_offset_s: of the source's clock, as estimated.
+        delay_s: how much later samples come than at first, which counts as their age.
+        counts: what it has seen.
+    """
 
     key: str
     source_age_s: float | None
     arrival_age_s: float | None
     clock_offset_s: float | None
+    delay_s: float
     counts: StreamCounts
 
 
@@ -110,5 +120,6 @@ def stream_status(stream: Stream, now_ns: int) -> StreamStatus:
         (now_ns - stream.newest_ns) / 1e9 if heard else None,
         (now_ns - stream.arrived_ns) / 1e9 if heard else None,
         None if stream.offset_ns is None else stream.offset_ns / 1e9,
+        stream.delay_ns / 1e9,
         stream.counts,
     )

@@ -51,6 +51,10 @@ class Keys(msgspec.Struct, frozen=True):
             return f"{self.domain}/{channel}/{dds_name(ros)}/{rihs01(ros)}"
         return f"{ROOT}/{channel}"
 
+    def every_type(self, channel: str) -> str:
+        """Of a channel whatever it carries: where the key names the type, one that carries another is to be seen."""
+        return f"{self.domain}/{channel}/*/*" if self.naming == "rmw_zenoh" else f"{ROOT}/{channel}"
+
     def service(self, name: str) -> str:
         """Of what is exchanged beside the streams, e.g. ``lease``, ``intervention``, ``status``."""
         return f"{ROOT}/{self.robot}/@/{name}"

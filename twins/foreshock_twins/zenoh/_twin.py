@@ -100,7 +100,7 @@ class ZenohTwin:
                 raise TwinError("error", f"the twin at {self._endpoint} said: {reply.err.payload.to_string()}")
             try:
                 return msgspec.json.decode(reply.ok.payload.to_bytes(), type=answer)
-            except msgspec.MsgspecError as e:
+            except (msgspec.MsgspecError, UnicodeDecodeError) as e:
                 raise TwinError("error", f"the twin at {self._endpoint} answered {request.op!r} wrongly: {e}") from None
         detail = f"no answer to {request.op!r} from {self._endpoint} on {self._key} within {self._timeout_s:g} s"
         raise TwinError("hang", detail)
