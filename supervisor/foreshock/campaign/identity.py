@@ -121,5 +121,17 @@ def changes(before: Mapping[str, Any], now: Mapping[str, Any], path: str = "") -
         elif isinstance(before[key], Mapping) and isinstance(now[key], Mapping):
             found += changes(before[key], now[key], place)
         elif before[key] != now[key]:
-            found.append(f"{place} was {before[key]}, is {now[key]}")
+            old, new = _by_name(before[key]), _by_name(now[key])
+            if old and new:
+                found += changes(old, new, place) or [f"{place} are in another order"]
+            else:
+                found.append(f"{place} was {before[key]}, is {now[key]}")
     return found
+
+
+def _by_name(value: Any) -> dict[str, Any]:
+    """A list of tables by the name that each has; empty if it is no such list, or a name is there twice."""
+    if not isinstance(value, list) or not all(isinstance(v, Mapping) for v in value):
+        return {}
+    names = [next((str(v[k]) for k in ("id", "parameter", "use") if k in v), "") for v in value]
+    return {} if len({*names} - {""}) < len(value) else dict(zip(names, value, strict=True))

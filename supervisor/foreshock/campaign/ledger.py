@@ -238,6 +238,10 @@ class Ledger:
         """Forget the runs that gave no result: those of one status, or all."""
         self._db.execute("delete from runs where status != 'ok' and (? = '' or status = ?)", (status, status))
 
+    def forget_unbegun(self) -> None:
+        """Forget a campaign of which there is no row."""
+        self._db.execute("delete from meta where not exists (select 1 from runs)")
+
     def changes(self, key: str) -> tuple[Intervention, ...]:
         """The interventions of a run."""
         packed = self._db.execute("select changes from runs where key = ?", (key,)).fetchone()[0]

@@ -22,7 +22,7 @@ from foreshock.session.run import Arm
 from foreshock.session.scenario import VARIANT, Scenario, find_scenario, load_scenario, scenario_ids
 from foreshock.session.scripted import acts_of, held, moved, protective
 
-__all__ = ["Case", "Plan", "files_of", "plan_of", "under"]
+__all__ = ["Case", "Plan", "declared", "files_of", "plan_of", "under"]
 
 SUPERVISOR: Mapping[str, Arm] = {"none": "off", "shadow": "shadow", "on": "on", "random": "off", "always": "off"}
 
@@ -163,7 +163,7 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
     if spec.budget.runs is not None and len(cases) > spec.budget.runs:
         raise ConfigError("budget.runs", f"{spec.budget.runs} runs, but the campaign has {len(cases)}")
     identity = {
-        "campaign": {k: v for k, v in msgspec.to_builtins(spec).items() if k not in ("title", "metrics", "budget")},
+        "campaign": declared(spec),
         "scenarios": {id_: _content(s) for id_, s in scenarios.items()},
         "twins": files,
         "files": named,
@@ -172,6 +172,12 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
     }
     # as it will be read from the ledger: lists, not tuples
     return Plan(spec, scenarios, msgspec.json.decode(msgspec.json.encode(identity)), tuple(cases), acts)
+
+
+def declared(spec: CampaignSpec) -> dict[str, Any]:
+    """What of a campaign results depend on, as it will be read from the ledger: lists, not tuples."""
+    tables: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(spec))
+    return {k: v for k, v in tables.items() if k not in ("title", "metrics", "budget")}
 
 
 def files_of(spec: CampaignSpec, scenarios: Mapping[str, Scenario]) -> dict[str, dict[str, str]]:

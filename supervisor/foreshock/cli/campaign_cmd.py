@@ -75,7 +75,7 @@ def run(spec: str, out: Path, workers: int, dask: str | None, as_json: bool) -> 
     Exit code 3 if a run gave no result; the others are not affected.
     """
     parsed, origin = load_campaign(spec)
-    return _go(begin(parsed, origin, out, Registry()), workers, dask, as_json)
+    return _go(begin(parsed, origin, out, Registry(), spec), workers, dask, as_json)
 
 
 @campaign.command()
@@ -86,7 +86,10 @@ def run(spec: str, out: Path, workers: int, dask: str | None, as_json: bool) -> 
 @dask_option
 @json_option
 def resume(folder: Path, accept: bool, retry: bool, workers: int, dask: str | None, as_json: bool) -> int:
-    """Go on with a campaign that was broken off; the result is the same as without the break."""
+    """Go on with a campaign that was broken off; the result is the same as without the break.
+
+    Its file is read again: with --accept, what was added to it is run, too.
+    """
     found, changed = reopen(folder, Registry(), accept=accept)
     if not accept:
         refuse_changes(folder, changed)
@@ -258,6 +261,8 @@ def _state(found: Campaign, rows: list[Row], changed: list[str]) -> dict[str, An
         "failed": failed,
         "simulated_h": sum(r.end_s or 0.0 for r in rows) / 3600.0,
         "changed": changed,
+        "note": found.note,
+        "aside": found.aside(),
     }
 
 
@@ -268,6 +273,10 @@ def _print_state(state: dict[str, Any], rows: list[Row]) -> None:
         f"{failed}",
         markup=False,
     )
+    if state["note"]:
+        notes.print(state["note"], markup=False, soft_wrap=True)
+    if state["aside"]:
+        console.print(f"{state['aside']} rows in the ledger are no longer part of it", markup=False)
     for line in state["changed"]:
         console.print(f"changed since it was begun: {line}", markup=False)
     for row in [r for r in rows if not r.ok][:8]:
