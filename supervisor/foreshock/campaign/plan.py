@@ -220,6 +220,12 @@ def _scenarios(spec: CampaignSpec, folder: Path, registry: Registry) -> list[tup
             if not any(fnmatchcase(id_, pattern) for id_ in found):
                 problem = f"{pattern!r} is none of the campaign's scenarios"
                 raise ConfigError(f"{place}.scenarios", problem, nearest(pattern, found))
+    for id_ in found:
+        parameters = [f.parameter for f in spec.factors if _matches(id_, f.scenarios)]
+        for name in parameters:
+            if parameters.count(name) > 1:
+                problem = f"is given twice for scenario {id_!r}"
+                raise ConfigError(f"factors.{name}", problem, "; make one of them, or limit their `scenarios`")
     return list(found.values())
 
 

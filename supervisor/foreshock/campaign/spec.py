@@ -74,7 +74,7 @@ class Factor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         parameter: name of the twin's parameter.
         scenarios: ids or patterns of the scenarios that have it; by default all.
-        values: these, all as likely; a grid takes each of them.
+        values: these, all as likely; a grid takes each of them, and refuses one that is there twice.
         uniform: low and high.
         log_uniform: low and high, above 0; its logarithm is uniform.
         normal: mean and standard deviation.
@@ -253,6 +253,11 @@ class CampaignSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.sampler == "grid":
             if self.points is not None:
                 raise ConfigError("points", "has no meaning for a grid", "; factors have values, or levels")
+            for factor in self.factors:  # points of a grid share their seeds: it would be the same run twice
+                for value in factor.values or ():
+                    if (factor.values or ()).count(value) > 1:
+                        problem = f"{value!r} is given twice"
+                        raise ConfigError(f"factors.{factor.parameter}.values", problem, "; replicates are more seeds")
             return
         if not self.factors:
             raise ConfigError("factors", f"is empty: sampler {self.sampler!r} has nothing to sample")
