@@ -120,6 +120,44 @@ def test_bad_input_after_the_first_row_can_be_repaired(file: Path, tmp_path: Pat
     assert wall_s(out).items() > before.items()
 
 
+def test_another_expectation_of_a_scenario_is_named_and_costs_no_run(file: Path, tmp_path: Path) -> None:
+    """Whether a scenario counts as harmless decides what its runs count as."""
+    out = tmp_path / "out"
+    assert run(file, out)[0] == 0
+    before = wall_s(out)
+    edit(tmp_path / "rogue.toml", 'expect = "open"', 'expect = "none"')
+    line = "scenarios.rogue.expect was open, is none"
+    assert line in foreshock("status", out)[1]
+    code, said = foreshock("resume", out)
+    assert (code, line in said) == (2, True), said
+    assert foreshock("resume", out, "--accept")[0] == 0
+    assert wall_s(out) == before
+    assert line not in foreshock("status", out)[1]
+
+
+def test_a_budget_of_wall_time_that_is_used_up_is_no_success(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    file.write_text(file.read_text() + "[budget]\nhours = 1e-9\n")
+    code, said = run(file, out)
+    assert code == 1, said
+    assert f"the budget of 1e-09 h is used up after 0 of 6 runs; go on with: foreshock campaign resume {out}" in said
+    assert foreshock("resume", out, "--workers", 1)[0] == 1
+    edit(file, "hours = 1e-9", "hours = 1.0")
+    assert foreshock("resume", out, "--workers", 1)[0] == 0
+
+
+def test_metrics_that_need_a_reference_arm_are_said_to_be_missing(file: Path, tmp_path: Path) -> None:
+    text = file.read_text().replace("replicates = 2", 'replicates = 1\nmetrics = ["accidents", "false-interventions"]')
+    arms = text.split("[[arms]]")
+    file.write_text(arms[0] + "[[arms]]" + arms[3])
+    code, said = run(file, tmp_path / "out")
+    assert (code, "there is no reference arm (kind none or shadow): no false-interventions" in said) == (0, True), said
+    assert "no reference arm" in foreshock("resume", tmp_path / "out")[1]
+    file.write_text(arms[0] + "[[arms]]" + arms[1] + "[[arms]]" + arms[3])
+    code, said = run(file, tmp_path / "two")
+    assert (code, "no reference arm" in said) == (0, False), said
+
+
 def test_a_file_that_is_gone_or_cannot_be_read(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run(file, out)[0] == 0

@@ -61,8 +61,8 @@ class Plan(msgspec.Struct, frozen=True):
     Attributes:
         spec: the campaign.
         scenarios: by id, with the campaign's changes but no arm's.
-        identity: what results depend on: campaign, scenarios, and hashes of the twins' files, of files that
-            configurations name, and of the code.
+        identity: what results and their verdicts depend on: campaign, scenarios, and hashes of the twins' files, of
+            files that configurations name, and of the code.
         cases: the runs.
         protective: by scenario and arm, for arms whose interventions others take, what their policies do at the mode's
             protective gate.
@@ -164,7 +164,8 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
         raise ConfigError("budget.runs", f"{spec.budget.runs} runs, but the campaign has {len(cases)}")
     identity = {
         "campaign": declared(spec),
-        "scenarios": {id_: _content(s) for id_, s in scenarios.items()},
+        # what a scenario expects changes no run, but what its runs count as
+        "scenarios": {id_: _content(s) | {"expect": s.expect} for id_, s in scenarios.items()},
         "twins": files,
         "files": named,
         "code": code,

@@ -43,6 +43,8 @@ Metric: TypeAlias = Literal[
     "failures",
 ]
 METRICS: tuple[Metric, ...] = get_args(Metric)
+PAIRED = frozenset({"difference", "prevented", "lead-time", "false-interventions", "reduced-speed"})
+"""Metrics that hold a run against the reference arm's of the same seed."""
 _NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*", re.ASCII)
 
 
@@ -286,6 +288,11 @@ class CampaignSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if arm.id == self.reference or (not self.reference and arm.kind in ("none", "shadow")):
                 return arm
         return None
+
+    @property
+    def unpaired(self) -> tuple[Metric, ...]:
+        """Metrics that it asks for and cannot have, since there is no reference arm."""
+        return () if self.reference_arm is not None else tuple(m for m in self.metrics if m in PAIRED)
 
     def arm(self, id_: str) -> ArmEntry:
         """The arm with this id."""
