@@ -111,6 +111,7 @@ def reopen(folder: Path, registry: Registry, *, accept: bool = False) -> tuple[C
         BadInputError: there is none, or it can be planned no longer; with accept, its file is wrong.
     """
     with Ledger(folder) as ledger:
+        ledger.expect("campaign")
         before = ledger.meta("identity", dict[str, Any])
         given, note, found = None, "", []
         try:

@@ -72,8 +72,8 @@ def schema() -> None:
 def run(spec: str, out: Path, workers: int, dask: str | None, as_json: bool) -> int:
     """Begin a campaign: SPEC is a TOML file, or the id of one that comes with Foreshock.
 
-    Exit code 3 if a run gave no result; the others are not affected. Else 1 if the budget of wall time was used up before
-    all were done.
+    Exit code 3 if a run gave no result; the others are not affected. Else 1 if the budget of wall time was used up
+    before all were done.
     """
     parsed, origin = load_campaign(spec)
     return _go(begin(parsed, origin, out, Registry(), spec), workers, dask, as_json)
