@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from foreshock.campaign.early import first_tick, place_of, refuse_arms, to_try
 from foreshock.campaign.identity import changes, digest
 from foreshock.campaign.ledger import Ledger, Row, locked, row_of
 from foreshock.campaign.plan import Case, Plan, declared, plan_of, under
@@ -92,6 +93,7 @@ def begin(spec: CampaignSpec, origin: Path, folder: Path, registry: Registry, so
         BadInputError: something in it is wrong, or the folder holds a campaign.
     """
     plan = plan_of(spec, origin, registry)
+    refuse_arms(plan, registry)
     with locked(folder), Ledger(folder, new=True) as ledger:
         lasting = str(Path(source).absolute()) if source.endswith(".toml") else source
         ledger.put_meta(source=lasting, **_facts(plan, origin))
@@ -132,6 +134,7 @@ def reopen(folder: Path, registry: Registry, *, accept: bool = False) -> tuple[C
             raise
         found += changes(before, plan.identity)
         if found and accept:
+            refuse_arms(plan, registry)
             ledger.put_meta(**_facts(plan, given[1]))
     return Campaign(folder, plan, note), found
 
@@ -167,8 +170,8 @@ def refuse_changes(
 class _Feed:
     """Gives the runs that are left, each after the run whose interventions it takes, and writes results down.
 
-    First comes of each scenario a run with a supervisor and one without: they find bad input before it costs much, and
-    say how long the rest takes.
+    First comes the first tick of what no other run tries, then of each scenario a run with a supervisor and one
+    without: they find bad input before it costs much, and the runs say how long the rest takes.
     """
 
     def __init__(
@@ -192,6 +195,8 @@ class _Feed:
         self._until_ns = None if hours is None else self._begin_ns + round(hours * 3600e9)
         self._ready: deque[Case] = deque(self._first())
         self._pilots = {c.key: math.nan for c in self._ready}
+        self._trials = {f"trial {c.key}": c for c in to_try(campaign.plan, self.left(), self._ready)}
+        self._untried = deque(self._trials)
         self.exhausted = False
         if not self._ready:
             self._go_on()
@@ -247,10 +252,13 @@ class _Feed:
 
     def next(self) -> tuple[str, Job] | None:
         """The next run."""
-        while self._ready:
+        while self._untried or self._ready:
             if self._until_ns is not None and monotonic_ns() >= self._until_ns:
                 self.exhausted = True
                 return None
+            if self._untried:
+                key = self._untried.popleft()
+                return key, first_tick(self._plan.job(self._trials[key]))
             case = self._ready.popleft()
             if not case.source:
                 return case.key, self._plan.job(case)
@@ -264,6 +272,9 @@ class _Feed:
 
     def done(self, key: str, result: Run | Failure, wall_s: float) -> None:
         """Write a result down."""
+        if key in self._trials:
+            self._tried(self._trials.pop(key), result)
+            return
         case = self._cases[key]
         row = row_of(case, result, wall_s, self._scripted.pop(key, ()))
         self._ledger.put(row, result.interventions if isinstance(result, Run) else ())
@@ -274,12 +285,21 @@ class _Feed:
         if key in self._pilots:
             if row.status == "bad-input":
                 self._ledger.forget("bad-input")
-                raise BadInputError(f"{row.scenario}, arm {row.arm}", row.detail)
+                raise BadInputError(place_of(case), row.detail)
             self._pilots[key] = wall_s / row.end_s if row.end_s else math.nan
-            if all(k in self._status for k in self._pilots):
-                self._go_on()
+            self._go_on_after_first()
         if self._told is not None:
             self._told(self.progress())
+
+    def _tried(self, case: Case, result: Run | Failure) -> None:
+        """A first tick tells of bad input only: what fails otherwise will do so in its run."""
+        if isinstance(result, Failure) and result.kind == "bad-input":
+            raise BadInputError(place_of(case), result.detail)
+        self._go_on_after_first()
+
+    def _go_on_after_first(self) -> None:
+        if not self._trials and all(k in self._status for k in self._pilots):
+            self._go_on()
 
     def progress(self) -> Progress:
         """How far it is."""
