@@ -78,13 +78,21 @@ def test_what_no_result_depends_on_may_change(file: Path, tmp_path: Path) -> Non
 
 def test_arms_and_factors_are_named_by_what_they_are(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    file.write_text(file.read_text() + ONE.format(parameter="from"))
+    fault = '[[faults]]\nid = "f"\nfaults = [{ kind = "dropout", channel = "rogue/count" }]\n'
+    file.write_text(file.read_text() + ONE.format(parameter="from") + fault)
     assert run(file, out)[0] == 0
+    edit(file, '"rogue/count"', '"rogue/*"')
     edit(file, "[0.05]", "[0.05, 0.1]")
     edit(file, 'id = "shadow"\nkind = "shadow"', 'id = "other"\nkind = "shadow"')
     said = foreshock("resume", out, "--workers", 1)[1]
-    for line in ("campaign.factors.from.values was [0.05], is [0.05, 0.1]", "arms.other is new", "arms.shadow is gone"):
+    for line in (
+        "campaign.factors.from.values was [0.05], is [0.05, 0.1]",
+        "campaign.arms.other is new",
+        "campaign.arms.shadow is gone",
+        "campaign.faults.f.faults.0.channel was rogue/count, is rogue/*",
+    ):
         assert line in said
+    edit(file, '"rogue/*"', '"rogue/count"')
     edit(file, "[0.05, 0.1]", "[0.05]")
     edit(file, '"other"\nkind = "shadow"', '"on"\nkind = "on"')
     on, shadow = ('[[arms]]\nid = "on"\nkind = "on"', '[[arms]]\nid = "shadow"\nkind = "shadow"')

@@ -259,6 +259,8 @@ class _Feed:
             if self._untried:
                 key = self._untried.popleft()
                 return key, first_tick(self._plan.job(self._trials[key]))
+            if self._trials:  # bad input that they find leaves no row behind
+                return None
             case = self._ready.popleft()
             if not case.source:
                 return case.key, self._plan.job(case)

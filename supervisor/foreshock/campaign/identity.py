@@ -150,8 +150,8 @@ def changes(before: Mapping[str, Any], now: Mapping[str, Any], path: str = "") -
 
 
 def _by_name(value: Any) -> dict[str, Any]:
-    """A list of tables by the name that each has; empty if it is no such list, or a name is there twice."""
+    """A list of tables by their names, else by their numbers; empty if it is no such list, or a name is there twice."""
     if not isinstance(value, list) or not all(isinstance(v, Mapping) for v in value):
         return {}
-    names = [next((str(v[k]) for k in ("id", "parameter", "use") if k in v), "") for v in value]
-    return {} if len({*names} - {""}) < len(value) else dict(zip(names, value, strict=True))
+    names = [next((str(v[k]) for k in ("id", "parameter", "use") if k in v), str(n)) for n, v in enumerate(value)]
+    return dict(zip(names, value, strict=True)) if len({*names}) == len(names) else {}
