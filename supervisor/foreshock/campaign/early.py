@@ -6,7 +6,7 @@ combination that no whole run at the beginning has.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 import msgspec
@@ -64,7 +64,7 @@ def to_try(plan: Plan, left: Iterable[Case], whole: Iterable[Case]) -> list[Case
         at = case.scenario, case.arm
         if at not in known:
             arm = plan.spec.arm(case.arm)
-            config: Mapping[str, object] = under(plan.scenarios[case.scenario], arm).config if arm.judged else {}
+            config = under(plan.scenarios[case.scenario], arm).config
             known[at] = digest([config.get("detectors"), config.get("supervisor")]) if arm.judged else ""
         return known[at]
 
