@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from foreshock.campaign import begin, load_campaign, reopen
 from foreshock.campaign.falsify import FRESH, Found, Search, _Source, falsify
 from foreshock.campaign.ledger import LEDGER, Ledger
 from foreshock.campaign.optimiser import Optimiser
@@ -167,6 +168,26 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
     (tmp_path / "rogue.toml").write_text(SCENARIO.replace("duration_s = 0.3", "duration_s = 0.4"))
     with pytest.raises(ConfigError, match=r"rogue\.duration_s was 0\.3, is 0\.4\ntake another folder"):
         falsify(search, tmp_path / "out", Registry(), 1)
+
+
+def test_bad_input_leaves_nothing_in_the_way(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="did you mean 'lift'"):
+        falsify(msgspec.structs.replace(LIFT, bounds={"lfit": (0.1, 0.6)}, runs=3), tmp_path / "out", Registry(), 1)
+    assert falsify(msgspec.structs.replace(LIFT, runs=3), tmp_path / "out", Registry(), 1).runs >= 3
+
+
+def test_a_search_and_a_campaign_refuse_each_others_folders(campaign_file: Path, tmp_path: Path) -> None:
+    search = Search(str(tmp_path / "rogue.toml"), {"behaviour": (5.0, 5.9)}, "always(count <= 1)", runs=3, seeds=3)
+    spec, origin = load_campaign(str(campaign_file))
+    begin(spec, origin, tmp_path / "campaign", Registry())
+    with pytest.raises(ConfigError, match="holds a campaign, and no search; take another folder"):
+        falsify(search, tmp_path / "campaign", Registry(), 1)
+    assert falsify(search, tmp_path / "search", Registry(), 1).runs == 3
+    said = "holds a search of foreshock falsify, and no campaign"
+    with pytest.raises(ConfigError, match=f"{said}; take another folder"):
+        begin(spec, origin, tmp_path / "search", Registry())
+    with pytest.raises(ConfigError, match=said):
+        reopen(tmp_path / "search", Registry())
 
 
 @pytest.mark.parametrize("kind", ["tpe", "random"])

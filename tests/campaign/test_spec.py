@@ -50,6 +50,7 @@ LEAST: dict[str, Any] = {"id": "c", "scenarios": [{"use": "a1-fall-onto-human"}]
         ({"factors": [{"parameter": "x"}]}, "factors.x: 0 of values"),
         ({"factors": [{"parameter": "x", "uniform": [2, 1]}]}, "low 2.0 is not below high 1.0"),
         ({"factors": [{"parameter": "x", "values": [math.inf]}]}, "not finite"),
+        ({"factors": [{"parameter": "x", "values": [0, 1, 0.0]}]}, r"factors\.x\.values: 0\.0 is given twice"),
         ({"factors": [{"parameter": "x", "log_uniform": [0, 1]}]}, "not a finite number above 0"),
         ({"factors": [{"parameter": "x", "uniform": [0, 1]}], "sampler": "sobol", "points": 6}, "no power of two"),
         ({"metrics": ["brierr"]}, "did you mean 'brier'"),
@@ -67,6 +68,10 @@ def test_what_is_wrong_is_named(change: dict[str, Any], said: str) -> None:
         ({"scenarios": [{"use": "a99-*"}]}, "no scenario matches"),
         ({"scenarios": [{"use": "a1-fall-onto-human"}, {"use": "a1-*"}]}, "a second time"),
         ({"factors": [{"parameter": "x", "values": [1], "scenarios": ["a2-*"]}]}, "none of the campaign's scenarios"),
+        (
+            {"factors": [{"parameter": "x", "values": [1]}, {"parameter": "x", "values": [2], "scenarios": ["a1-*"]}]},
+            r"factors\.x: is given twice for scenario 'a1-fall-onto-human'",
+        ),
         ({"arms": [{"id": "on", "kind": "on", "policy": "laddder"}]}, "did you mean 'ladder'"),
         ({"arms": [{"id": "on", "kind": "on", "config": {"risk": {"modle": 1}}}]}, "did you mean 'model'"),
         ({"budget": {"runs": 2}, "replicates": 3}, "2 runs, but the campaign has 3"),
@@ -115,6 +120,21 @@ def test_arms_share_seeds_and_scripted_arms_follow_theirs() -> None:
         if c.arm in ("random", "always"):
             source = on[c.source]
             assert (source.scenario, source.point, source.seed) == (c.scenario, c.point, c.seed)
+
+
+def test_a_value_given_twice_is_a_weight_where_points_have_seeds_of_their_own() -> None:
+    factors = [{"parameter": "drop_mu", "values": [0.04, 0.04, 0.06]}]
+    spec = parse_campaign({**LEAST, "factors": factors, "sampler": "monte-carlo", "points": 8}, "c")
+    cases = plan_of(spec, Path(), Registry()).cases
+    assert len({c.seed for c in cases}) == 8
+
+
+def test_one_parameter_can_have_a_factor_in_each_scenario() -> None:
+    names = ("a1-fall-onto-human", "a1-fall-onto-human-nominal")
+    factors = [{"parameter": "drop_mu", "values": [0.04 + 0.01 * k], "scenarios": [n]} for k, n in enumerate(names)]
+    spec = parse_campaign({**LEAST, "scenarios": [{"use": n} for n in names], "factors": factors}, "c")
+    cases = plan_of(spec, Path(), Registry()).cases
+    assert {c.scenario: c.parameters["drop_mu"] for c in cases} == dict(zip(names, (0.04, 0.05), strict=True))
 
 
 def test_sampled_points_have_seeds_of_their_own() -> None:

@@ -62,7 +62,7 @@ def dask_runner(address: str, plan: Plan) -> Runner:
 
 def _check(client: Any, plan: Plan) -> None:
     """Refuse a cluster without workers, and a worker that would run something else."""
-    found = client.run(_identity, plan.spec, plan.scenarios, tuple(plan.identity["plugins"]))
+    found = client.run(_identity, plan.spec, plan.scenarios, tuple(plan.identity["plugins"]), plan.folder)
     if not found:
         raise BadInputError("--dask", "the cluster has no worker")
     here = {k: plan.identity[k] for k in ("code", "twins", "files")}
@@ -71,11 +71,13 @@ def _check(client: Any, plan: Plan) -> None:
             raise BadInputError(f"--dask: worker {worker}", "runs something else:\n  " + "\n  ".join(differs))
 
 
-def _identity(spec: CampaignSpec, scenarios: Mapping[str, Scenario], plugins: Sequence[str]) -> dict[str, Any]:
+def _identity(
+    spec: CampaignSpec, scenarios: Mapping[str, Scenario], plugins: Sequence[str], folder: str
+) -> dict[str, Any]:
     """On a worker: what its results would depend on."""
     registry = Registry()
     twins = {id_: twin_files(s, registry) for id_, s in scenarios.items()}
-    return {"code": versions(plugins), "twins": twins, "files": files_of(spec, scenarios)}
+    return {"code": versions(plugins), "twins": twins, "files": files_of(spec, scenarios, Path(folder))}
 
 
 def _run(distributed: Any, client: Any, source: Source[str], timeout_s: float | None) -> None:

@@ -12,10 +12,11 @@ from typing import Any
 
 import msgspec
 
+from foreshock.campaign.early import first_tick, place_of, refuse_arms, to_try
 from foreshock.campaign.identity import changes, digest
 from foreshock.campaign.ledger import Ledger, Row, locked, row_of
-from foreshock.campaign.plan import Case, Plan, plan_of, under
-from foreshock.campaign.spec import CampaignSpec
+from foreshock.campaign.plan import Case, Plan, declared, plan_of, under
+from foreshock.campaign.spec import CampaignSpec, load_campaign, shipped
 from foreshock.clock import monotonic_ns, seconds
 from foreshock.errors import BadInputError, ConfigError
 from foreshock.records import Intervention
@@ -31,15 +32,27 @@ Runner = Callable[[Source[str], int, "float | None", Path], None]
 
 
 class Campaign(msgspec.Struct, frozen=True):
-    """A campaign in its folder."""
+    """A campaign in its folder.
+
+    Attributes:
+        folder: of its ledger and results.
+        plan: its runs.
+        note: what is to be said of its file; empty for nothing.
+    """
 
     folder: Path
     plan: Plan
+    note: str = ""
 
     def rows(self) -> list[Row]:
         """What was run, in the plan's order, whatever has changed since then."""
         with Ledger(self.folder) as ledger:
-            return ledger.recorded(ledger.meta("keys", list[str]))
+            return ledger.recorded(ledger.known("keys", list[str]) or ())
+
+    def aside(self) -> int:
+        """How many rows the ledger keeps that are no part of the campaign any more."""
+        with Ledger(self.folder) as ledger:
+            return len(ledger.statuses().keys() - set(ledger.known("keys", list[str]) or ()))
 
 
 class Estimate(msgspec.Struct, frozen=True):
@@ -65,7 +78,7 @@ class Progress(msgspec.Struct, frozen=True):
     rate_hz: float
 
 
-def begin(spec: CampaignSpec, origin: Path, folder: Path, registry: Registry) -> Campaign:
+def begin(spec: CampaignSpec, origin: Path, folder: Path, registry: Registry, source: str = "") -> Campaign:
     """A new campaign in a folder; nothing runs yet.
 
     Args:
@@ -73,38 +86,73 @@ def begin(spec: CampaignSpec, origin: Path, folder: Path, registry: Registry) ->
         origin: folder that its paths start from.
         folder: where ledger and results are kept.
         registry: of plugins.
+        source: the file that it was read from, or the id of a ready one, to be read again when it is reopened; empty
+            for none.
 
     Raises:
         BadInputError: something in it is wrong, or the folder holds a campaign.
     """
     plan = plan_of(spec, origin, registry)
+    refuse_arms(plan, registry)
     with locked(folder), Ledger(folder, new=True) as ledger:
-        ledger.put_meta(spec=spec, origin=str(origin), **_facts(plan))
+        lasting = str(Path(source).absolute()) if source.endswith(".toml") else source
+        ledger.put_meta(source=lasting, **_facts(plan, origin))
     return Campaign(folder, plan)
 
 
 def reopen(folder: Path, registry: Registry, *, accept: bool = False) -> tuple[Campaign, list[str]]:
-    """A campaign that was begun, and what has changed since then.
+    """A campaign that was begun, and what has changed since then, its file included.
 
     Args:
         folder: of the campaign.
         registry: of plugins.
-        accept: go on with what there is now: runs whose key has changed are to be done again.
+        accept: go on with what there is now: runs whose key has changed are to be done again. Else the campaign is as
+            it was begun, but for what of its file no result depends on.
+
+    Raises:
+        BadInputError: there is none, or it can be planned no longer; with accept, its file is wrong.
     """
     with Ledger(folder) as ledger:
-        spec = ledger.meta("spec", CampaignSpec)
-        before = ledger.meta("identity", dict)
-        plan = plan_of(spec, Path(ledger.meta("origin", str)), registry)
-        found = changes(before, plan.identity)
+        ledger.expect("campaign")
+        before = ledger.meta("identity", dict[str, Any])
+        given, note, found = None, "", []
+        try:
+            given, note = _of_file(ledger)
+        except BadInputError as e:
+            if accept:
+                raise
+            found = [f"its file cannot be used: {e}"]
+        if given is not None and not accept:
+            found = changes(before["campaign"], declared(given[0]), "campaign")
+        if given is None or found:
+            given = ledger.meta("spec", CampaignSpec), Path(ledger.meta("origin", str))
+        try:
+            plan = plan_of(*given, registry)
+        except BadInputError as e:
+            if found:
+                refuse_changes(folder, [*found, str(e)])
+            raise
+        found += changes(before, plan.identity)
         if found and accept:
-            ledger.put_meta(**_facts(plan))
-    return Campaign(folder, plan), found
+            refuse_arms(plan, registry)
+            ledger.put_meta(**_facts(plan, given[1]))
+    return Campaign(folder, plan, note), found
 
 
-def _facts(plan: Plan) -> dict[str, Any]:
-    """What is kept of a plan: what it depends on, its scenarios, and its runs and their keys."""
-    kept = {"identity": plan.identity, "scenarios": plan.scenarios, "cases": plan.cases}
-    return {**kept, "keys": [c.key for c in plan.cases]}
+def _of_file(ledger: Ledger) -> tuple[tuple[CampaignSpec, Path] | None, str]:
+    """The campaign as its file has it now, if there is one, and what is to be said of that."""
+    source = ledger.known("source", str)
+    if not source:
+        return None, ""
+    if Path(source).is_file() if source.endswith(".toml") else source in shipped():
+        return load_campaign(source), ""
+    return None, f"{source} is gone; the campaign is what the ledger keeps of it"
+
+
+def _facts(plan: Plan, origin: Path) -> dict[str, Any]:
+    """What is kept of a plan: the campaign, what it depends on, its scenarios, and its runs and their keys."""
+    kept = {"spec": plan.spec, "origin": str(origin), "identity": plan.identity, "scenarios": plan.scenarios}
+    return {**kept, "cases": plan.cases, "keys": [c.key for c in plan.cases]}
 
 
 def refuse_changes(
@@ -122,8 +170,8 @@ def refuse_changes(
 class _Feed:
     """Gives the runs that are left, each after the run whose interventions it takes, and writes results down.
 
-    First comes of each scenario a run with a supervisor and one without: they find bad input before it costs much, and
-    say how long the rest takes.
+    First comes the first tick of what no other run tries, then of each scenario a run with a supervisor and one
+    without: they find bad input before it costs much, and the runs say how long the rest takes.
     """
 
     def __init__(
@@ -147,6 +195,8 @@ class _Feed:
         self._until_ns = None if hours is None else self._begin_ns + round(hours * 3600e9)
         self._ready: deque[Case] = deque(self._first())
         self._pilots = {c.key: math.nan for c in self._ready}
+        self._trials = {f"trial {c.key}": c for c in to_try(campaign.plan, self.left(), self._ready)}
+        self._untried = deque(self._trials)
         self.exhausted = False
         if not self._ready:
             self._go_on()
@@ -202,9 +252,14 @@ class _Feed:
 
     def next(self) -> tuple[str, Job] | None:
         """The next run."""
-        while self._ready:
+        while self._untried or self._ready:
             if self._until_ns is not None and monotonic_ns() >= self._until_ns:
                 self.exhausted = True
+                return None
+            if self._untried:
+                key = self._untried.popleft()
+                return key, first_tick(self._plan.job(self._trials[key]))
+            if self._trials:  # bad input that they find leaves no row behind
                 return None
             case = self._ready.popleft()
             if not case.source:
@@ -219,6 +274,9 @@ class _Feed:
 
     def done(self, key: str, result: Run | Failure, wall_s: float) -> None:
         """Write a result down."""
+        if key in self._trials:
+            self._tried(self._trials.pop(key), result)
+            return
         case = self._cases[key]
         row = row_of(case, result, wall_s, self._scripted.pop(key, ()))
         self._ledger.put(row, result.interventions if isinstance(result, Run) else ())
@@ -229,12 +287,21 @@ class _Feed:
         if key in self._pilots:
             if row.status == "bad-input":
                 self._ledger.forget("bad-input")
-                raise BadInputError(f"{row.scenario}, arm {row.arm}", row.detail)
+                raise BadInputError(place_of(case), row.detail)
             self._pilots[key] = wall_s / row.end_s if row.end_s else math.nan
-            if all(k in self._status for k in self._pilots):
-                self._go_on()
+            self._go_on_after_first()
         if self._told is not None:
             self._told(self.progress())
+
+    def _tried(self, case: Case, result: Run | Failure) -> None:
+        """A first tick tells of bad input only: what fails otherwise will do so in its run."""
+        if isinstance(result, Failure) and result.kind == "bad-input":
+            raise BadInputError(place_of(case), result.detail)
+        self._go_on_after_first()
+
+    def _go_on_after_first(self) -> None:
+        if not self._trials and all(k in self._status for k in self._pilots):
+            self._go_on()
 
     def progress(self) -> Progress:
         """How far it is."""
@@ -269,13 +336,18 @@ def execute(
         Whether everything is done; False if the budget of wall time was used up.
 
     Raises:
-        BadInputError: one of the first runs names something that does not exist, or another process runs it.
+        BadInputError: one of the first runs names something that does not exist, or another process runs it. A
+            campaign of which nothing was run is then forgotten: it can be begun anew.
     """
     with locked(campaign.folder), Ledger(campaign.folder) as ledger, scratch_in(campaign.folder) as scratch:
         if retry:
             ledger.forget()
         feed = _Feed(campaign, ledger, workers, estimated, told)
-        runner(feed, workers, campaign.plan.spec.timeout_s, scratch)
+        try:
+            runner(feed, workers, campaign.plan.spec.timeout_s, scratch)
+        except BadInputError:
+            ledger.forget_unbegun()
+            raise
         return not feed.exhausted
 
 

@@ -166,22 +166,17 @@ def falsify(
         told: told how far it is after each run.
 
     Raises:
-        BadInputError: something in it is wrong, or what the folder holds depends on what has changed.
+        BadInputError: something in it is wrong, what the folder holds depends on what has changed, or is a campaign.
         MissingExtraError: optuna or rtamt is not installed.
     """
     arms = (ArmEntry("on", "on", policy=search.policy), ArmEntry("none", "none"))
     plan = plan_of(CampaignSpec("falsify", (ScenarioEntry(search.scenario),), arms), Path.cwd(), registry)
     source = _Source(search, plan, folder, told)
     with locked(folder), Ledger(folder, new=not (folder / LEDGER).exists()) as ledger, scratch_in(folder) as scratch:
-        # as it will be read from the ledger; a longer search goes on from a shorter one
-        settings = {
-            k: v for k, v in msgspec.json.decode(msgspec.json.encode(search)).items() if k not in ("runs", "cases")
-        }
-        now = {**plan.identity, "search": settings}
+        ledger.expect("search")
         before = ledger.known("falsify", dict[str, Any])
-        if before is None:
-            ledger.put_meta(falsify=now)
-        refuse_changes(folder, changes(before or now, now), "\ntake another folder")
+        if before is not None:
+            refuse_changes(folder, changes(before, source.facts), "\ntake another folder")
         source.ledger = ledger
         run_stream(source, workers, timeout_s, scratch)
     return source.found
@@ -206,6 +201,10 @@ class _Source:
         if not self._space:
             raise ConfigError(self._base.id, "draws no parameter", "; name bounds")
         self._identity = digest([plan.identity, formula])
+        # as it will be read from the ledger; a longer search goes on from a shorter one
+        settings = msgspec.json.decode(msgspec.json.encode(search))
+        self.facts = {**plan.identity, "search": {k: v for k, v in settings.items() if k not in ("runs", "cases")}}
+        self._kept = False
         self._failed: Counter[str] = Counter()
         self.found = Found(self._base.id, formula, {n: support(d) for n, d in self._space.items()})
         self._steps = self._search_steps()
@@ -231,7 +230,9 @@ class _Source:
     def done(self, key: str, result: Run | Failure, wall_s: float) -> None:  # noqa: ARG002 # the source of a stream
         """Write a result down."""
         outcome = self._outcome(result)
-        self.ledger.put_meta(**{key: outcome})
+        # what it depends on is kept with the first result: a search that never got that far binds nobody
+        self.ledger.put_meta(**{key: outcome}, **({} if self._kept else {"falsify": self.facts}))
+        self._kept = True
         self._take(key, outcome)
 
     def _ask(self, wanted: Sequence[_Wanted]) -> None:

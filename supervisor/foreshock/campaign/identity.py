@@ -19,10 +19,14 @@ from foreshock.registry import Registry
 from foreshock.session.isolated import placed
 from foreshock.session.scenario import Scenario
 
-__all__ = ["changes", "digest", "named_files", "twin_files", "versions"]
+__all__ = ["beside", "changes", "digest", "named_files", "twin_files", "versions"]
 
 ASIDE = frozenset({"calibration", "campaign", "cli", "events", "live", "report", "sensitivity"})
 """Parts of the core that no stepped run passes through."""
+
+
+_FILE = re.compile(r"[^\0\n]{1,240}\.\w{1,8}")
+"""What may be the name of a file."""
 
 
 def digest(value: Any) -> str:
@@ -67,9 +71,25 @@ def named_files(config: Any, folder: Path) -> dict[str, str]:
         config = tuple(config.values())
     if isinstance(config, (list, tuple)):
         return {name: found for part in config for name, found in named_files(part, folder).items()}
-    if not isinstance(config, str) or not re.fullmatch(r"[^\0\n]{1,240}\.\w{1,8}", config):
+    if not isinstance(config, str) or not _FILE.fullmatch(config):
         return {}
     return {config: _of_file(folder / config)} if (folder / config).is_file() else {}
+
+
+def beside(config: Any, folder: Path) -> Any:
+    """A configuration with the files that it names, relative to a folder, by their paths.
+
+    A name is that of a file if there is one, or if it ends as parameters, a taxonomy or a model of a robot do.
+    """
+    if isinstance(config, Mapping):
+        return {key: beside(part, folder) for key, part in config.items()}
+    if isinstance(config, (list, tuple)):
+        return [beside(part, folder) for part in config]
+    if not isinstance(config, str) or not _FILE.fullmatch(config):
+        return config
+    return (
+        str(folder / config) if config.endswith((".toml", ".urdf", ".srdf")) or (folder / config).is_file() else config
+    )
 
 
 def versions(plugins: Iterable[str]) -> dict[str, str]:
@@ -121,5 +141,17 @@ def changes(before: Mapping[str, Any], now: Mapping[str, Any], path: str = "") -
         elif isinstance(before[key], Mapping) and isinstance(now[key], Mapping):
             found += changes(before[key], now[key], place)
         elif before[key] != now[key]:
-            found.append(f"{place} was {before[key]}, is {now[key]}")
+            old, new = _by_name(before[key]), _by_name(now[key])
+            if old and new:
+                found += changes(old, new, place) or [f"{place} are in another order"]
+            else:
+                found.append(f"{place} was {before[key]}, is {now[key]}")
     return found
+
+
+def _by_name(value: Any) -> dict[str, Any]:
+    """A list of tables by their names, else by their numbers; empty if it is no such list, or a name is there twice."""
+    if not isinstance(value, list) or not all(isinstance(v, Mapping) for v in value):
+        return {}
+    names = [next((str(v[k]) for k in ("id", "parameter", "use") if k in v), str(n)) for n, v in enumerate(value)]
+    return dict(zip(names, value, strict=True)) if len({*names}) == len(names) else {}

@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import msgspec
 
@@ -165,7 +165,7 @@ class Ledger:
     """
 
     def __init__(self, folder: Path, *, new: bool = False) -> None:
-        path = folder / LEDGER
+        self._folder, path = folder, folder / LEDGER
         if not new and not path.exists():
             raise ConfigError(str(folder), f"holds no campaign: there is no {LEDGER}")
         folder.mkdir(parents=True, exist_ok=True)
@@ -179,7 +179,10 @@ class Ledger:
             raise BadInputError(str(path), f"is no ledger: {e}") from None
         # one that was killed before it kept anything is no campaign yet
         if new and self._db.execute("select 1 from meta limit 1").fetchone():
-            self._db.close()
+            try:
+                self.expect("campaign")
+            finally:
+                self._db.close()
             hint = f"; continue it with: foreshock campaign resume {folder}"
             raise ConfigError(str(folder), "holds a campaign already", hint)
 
@@ -192,6 +195,16 @@ class Ledger:
     def close(self) -> None:
         """Close the file."""
         self._db.close()
+
+    def expect(self, kind: Literal["campaign", "search"]) -> None:
+        """Refuse a folder that holds the other kind.
+
+        Raises:
+            ConfigError: it does.
+        """
+        mark, other = ("falsify", "search of foreshock falsify") if kind == "campaign" else ("spec", "campaign")
+        if self.known(mark, dict[str, Any]) is not None:
+            raise ConfigError(str(self._folder), f"holds a {other}, and no {kind}", "; take another folder")
 
     def put_meta(self, **values: Any) -> None:
         """Keep facts about the campaign."""
@@ -237,6 +250,10 @@ class Ledger:
     def forget(self, status: str = "") -> None:
         """Forget the runs that gave no result: those of one status, or all."""
         self._db.execute("delete from runs where status != 'ok' and (? = '' or status = ?)", (status, status))
+
+    def forget_unbegun(self) -> None:
+        """Forget a campaign of which there is no row."""
+        self._db.execute("delete from meta where not exists (select 1 from runs)")
 
     def changes(self, key: str) -> tuple[Intervention, ...]:
         """The interventions of a run."""

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from foreshock._strict import convert
-from foreshock.campaign.identity import digest, named_files, twin_files, versions
+from foreshock.campaign.identity import beside, digest, named_files, twin_files, versions
 from foreshock.campaign.sampling import points_of
 from foreshock.campaign.spec import ArmEntry, CampaignSpec, FaultEntry, ScenarioEntry
 from foreshock.errors import ConfigError, nearest
@@ -22,7 +22,7 @@ from foreshock.session.run import Arm
 from foreshock.session.scenario import VARIANT, Scenario, find_scenario, load_scenario, scenario_ids
 from foreshock.session.scripted import acts_of, held, moved, protective
 
-__all__ = ["Case", "Plan", "files_of", "plan_of", "under"]
+__all__ = ["Case", "Plan", "declared", "files_of", "plan_of", "runs_in", "under"]
 
 SUPERVISOR: Mapping[str, Arm] = {"none": "off", "shadow": "shadow", "on": "on", "random": "off", "always": "off"}
 
@@ -61,11 +61,12 @@ class Plan(msgspec.Struct, frozen=True):
     Attributes:
         spec: the campaign.
         scenarios: by id, with the campaign's changes but no arm's.
-        identity: what results depend on: campaign, scenarios, and hashes of the twins' files, of files that
-            configurations name, and of the code.
+        identity: what results and their verdicts depend on: campaign, scenarios, and hashes of the twins' files, of
+            files that configurations name, and of the code.
         cases: the runs.
         protective: by scenario and arm, for arms whose interventions others take, what their policies do at the mode's
             protective gate.
+        folder: that the files of arms are relative to.
     """
 
     spec: CampaignSpec
@@ -73,10 +74,12 @@ class Plan(msgspec.Struct, frozen=True):
     identity: dict[str, Any]
     cases: tuple[Case, ...]
     protective: dict[tuple[str, str], tuple[Intervention, ...]] = {}
+    folder: str = ""
 
     def scenario(self, case: Case) -> Scenario:
         """The scenario of a run, under its arm, with its values and faults."""
-        scenario = under(self.scenarios[case.scenario], self.spec.arm(case.arm)).with_(case.parameters)
+        arm = self.spec.arm(case.arm)
+        scenario = under(self.scenarios[case.scenario], arm, Path(self.folder)).with_(case.parameters)
         return _with_faults(scenario, next((f for f in self.spec.faults if f.id == case.fault), None))
 
     def job(self, case: Case, changes: tuple[Intervention, ...] = ()) -> Job:
@@ -100,10 +103,17 @@ class Plan(msgspec.Struct, frozen=True):
         return sum(self.scenarios[c.scenario].duration_s for c in cases)
 
 
-def under(scenario: Scenario, arm: ArmEntry) -> Scenario:
-    """A scenario with the configuration of an arm."""
+def under(scenario: Scenario, arm: ArmEntry, folder: Path | None = None) -> Scenario:
+    """A scenario with the configuration of an arm.
+
+    Args:
+        scenario: the scenario.
+        arm: the arm.
+        folder: that the arm's files are relative to; without one they keep their names, as in a run's key.
+    """
     changed = scenario.with_(policy=arm.policy)
-    return msgspec.structs.replace(changed, config=merged(changed.config, _filled(arm.config, scenario.mode)))
+    config = arm.config if folder is None else beside(arm.config, folder)
+    return msgspec.structs.replace(changed, config=merged(changed.config, _filled(config, scenario.mode)))
 
 
 def _filled(value: Any, mode: str) -> Any:
@@ -120,7 +130,8 @@ def _with_faults(scenario: Scenario, entry: FaultEntry | None) -> Scenario:
     return msgspec.structs.replace(scenario, faults=(*scenario.faults, *entry.faults))
 
 
-def _matches(id_: str, patterns: Iterable[str]) -> bool:
+def runs_in(id_: str, patterns: Iterable[str]) -> bool:
+    """Whether a scenario is among these ids and patterns."""
     return any(fnmatchcase(id_, pattern) for pattern in patterns)
 
 
@@ -150,12 +161,13 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
     plugins = _check_arms(spec, scenarios, registry)
     code = versions(plugins)
     files = {id_: twin_files(s, registry) for id_, s in scenarios.items()}
-    named = files_of(spec, scenarios)
+    folder = folder.absolute()
+    named = files_of(spec, scenarios, folder)
     acts = {
-        (s.id, source.id): protective(under(s, source).supervisor(), s.mode, registry)
+        (s.id, source.id): protective(under(s, source, folder).supervisor(), s.mode, registry)
         for source in {a.id: spec.source(a) for a in spec.arms if a.scripted}.values()
         for s in scenarios.values()
-        if _matches(s.id, source.scenarios)
+        if runs_in(s.id, source.scenarios)
     }
     cases: list[Case] = []
     for scenario, replicates in entries:
@@ -163,29 +175,38 @@ def plan_of(spec: CampaignSpec, folder: Path, registry: Registry) -> Plan:
     if spec.budget.runs is not None and len(cases) > spec.budget.runs:
         raise ConfigError("budget.runs", f"{spec.budget.runs} runs, but the campaign has {len(cases)}")
     identity = {
-        "campaign": {k: v for k, v in msgspec.to_builtins(spec).items() if k not in ("title", "metrics", "budget")},
-        "scenarios": {id_: _content(s) for id_, s in scenarios.items()},
+        "campaign": declared(spec),
+        # what a scenario expects changes no run, but what its runs count as
+        "scenarios": {id_: _content(s) | {"expect": s.expect} for id_, s in scenarios.items()},
         "twins": files,
         "files": named,
         "code": code,
         "plugins": sorted(plugins),
     }
     # as it will be read from the ledger: lists, not tuples
-    return Plan(spec, scenarios, msgspec.json.decode(msgspec.json.encode(identity)), tuple(cases), acts)
+    decoded = msgspec.json.decode(msgspec.json.encode(identity))
+    return Plan(spec, scenarios, decoded, tuple(cases), acts, str(folder))
 
 
-def files_of(spec: CampaignSpec, scenarios: Mapping[str, Scenario]) -> dict[str, dict[str, str]]:
+def declared(spec: CampaignSpec) -> dict[str, Any]:
+    """What of a campaign results depend on, as it will be read from the ledger: lists, not tuples."""
+    tables: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(spec))
+    return {k: v for k, v in tables.items() if k not in ("title", "metrics", "budget")}
+
+
+def files_of(spec: CampaignSpec, scenarios: Mapping[str, Scenario], folder: Path) -> dict[str, dict[str, str]]:
     """Hashes of the files that the configurations of a campaign name, by scenario and arm; those without are left out.
 
     Args:
         spec: the campaign.
         scenarios: of it, by id.
+        folder: that the files of arms are relative to; those of a scenario are relative to its own.
     """
     found = {
-        f"{s.id}, {arm.id}": named_files(under(s, arm).config, Path(s.folder))
+        f"{s.id}, {arm.id}": named_files(under(s, arm).config, Path(s.folder)) | named_files(arm.config, folder)
         for s in scenarios.values()
         for arm in spec.arms
-        if arm.judged and _matches(s.id, arm.scenarios)
+        if arm.judged and runs_in(s.id, arm.scenarios)
     }
     return {place: files for place, files in found.items() if files}
 
@@ -214,6 +235,12 @@ def _scenarios(spec: CampaignSpec, folder: Path, registry: Registry) -> list[tup
             if not any(fnmatchcase(id_, pattern) for id_ in found):
                 problem = f"{pattern!r} is none of the campaign's scenarios"
                 raise ConfigError(f"{place}.scenarios", problem, nearest(pattern, found))
+    for id_ in found:
+        parameters = [f.parameter for f in spec.factors if runs_in(id_, f.scenarios)]
+        for name in parameters:
+            if parameters.count(name) > 1:
+                problem = f"is given twice for scenario {id_!r}"
+                raise ConfigError(f"factors.{name}", problem, "; make one of them, or limit their `scenarios`")
     return list(found.values())
 
 
@@ -235,7 +262,7 @@ def _check_arms(spec: CampaignSpec, scenarios: Mapping[str, Scenario], registry:
     for scenario in scenarios.values():
         plugins.add(scenario.twin["kind"])
         for arm in spec.arms:
-            if not arm.judged or not _matches(scenario.id, arm.scenarios):
+            if not arm.judged or not runs_in(scenario.id, arm.scenarios):
                 continue
             place = f"{scenario.id}, arm {arm.id}"
             config = under(scenario, arm).supervisor()
@@ -255,9 +282,9 @@ def _cases(
     named: Mapping[str, Mapping[str, str]],
     acts: Mapping[tuple[str, str], Sequence[Intervention]],
 ) -> list[Case]:
-    factors = [f for f in spec.factors if _matches(scenario.id, f.scenarios)]
-    faults = [None, *(f for f in spec.faults if _matches(scenario.id, f.scenarios))]
-    arms = sorted((a for a in spec.arms if _matches(scenario.id, a.scenarios)), key=lambda a: a.scripted)
+    factors = [f for f in spec.factors if runs_in(scenario.id, f.scenarios)]
+    faults = [None, *(f for f in spec.faults if runs_in(scenario.id, f.scenarios))]
+    arms = sorted((a for a in spec.arms if runs_in(scenario.id, a.scenarios)), key=lambda a: a.scripted)
     cases = []
     for p, values in enumerate(points_of(spec, factors, scenario.id)):
         for r, fault in itertools.product(range(replicates), faults):

@@ -40,5 +40,5 @@ def recorded(folder: Path, registry: Registry) -> tuple[Campaign, list[str]]:
             raise
         return Campaign(folder, Plan(spec, scenarios, identity, cases)), [f"what there is now cannot be compared: {e}"]
     if scenarios is None or cases is None:
-        return Campaign(folder, msgspec.structs.replace(now.plan, identity=identity)), found
-    return Campaign(folder, Plan(spec, scenarios, identity, cases)), found
+        return msgspec.structs.replace(now, plan=msgspec.structs.replace(now.plan, identity=identity)), found
+    return Campaign(folder, Plan(now.plan.spec, scenarios, identity, cases), now.note), found

@@ -43,6 +43,8 @@ Metric: TypeAlias = Literal[
     "failures",
 ]
 METRICS: tuple[Metric, ...] = get_args(Metric)
+PAIRED = frozenset({"difference", "prevented", "lead-time", "false-interventions", "reduced-speed"})
+"""Metrics that hold a run against the reference arm's of the same seed."""
 _NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*", re.ASCII)
 
 
@@ -74,7 +76,7 @@ class Factor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         parameter: name of the twin's parameter.
         scenarios: ids or patterns of the scenarios that have it; by default all.
-        values: these, all as likely; a grid takes each of them.
+        values: these, all as likely; a grid takes each of them, and refuses one that is there twice.
         uniform: low and high.
         log_uniform: low and high, above 0; its logarithm is uniform.
         normal: mean and standard deviation.
@@ -253,6 +255,11 @@ class CampaignSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.sampler == "grid":
             if self.points is not None:
                 raise ConfigError("points", "has no meaning for a grid", "; factors have values, or levels")
+            for factor in self.factors:  # points of a grid share their seeds: it would be the same run twice
+                for value in factor.values or ():
+                    if (factor.values or ()).count(value) > 1:
+                        problem = f"{value!r} is given twice"
+                        raise ConfigError(f"factors.{factor.parameter}.values", problem, "; replicates are more seeds")
             return
         if not self.factors:
             raise ConfigError("factors", f"is empty: sampler {self.sampler!r} has nothing to sample")
@@ -281,6 +288,11 @@ class CampaignSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if arm.id == self.reference or (not self.reference and arm.kind in ("none", "shadow")):
                 return arm
         return None
+
+    @property
+    def unpaired(self) -> tuple[Metric, ...]:
+        """Metrics that it asks for and cannot have, since there is no reference arm."""
+        return () if self.reference_arm is not None else tuple(m for m in self.metrics if m in PAIRED)
 
     def arm(self, id_: str) -> ArmEntry:
         """The arm with this id."""

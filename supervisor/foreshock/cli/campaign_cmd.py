@@ -73,10 +73,11 @@ def schema() -> None:
 def run(spec: str, out: Path, workers: int, dask: str | None, as_json: bool) -> int:
     """Begin a campaign: SPEC is a TOML file, or the id of one that comes with Foreshock.
 
-    Exit code 3 if a run gave no result; the others are not affected.
+    Exit code 3 if a run gave no result; the others are not affected. Else 1 if the budget of wall time was used up
+    before all were done.
     """
     parsed, origin = load_campaign(spec)
-    return _go(begin(parsed, origin, out, Registry()), workers, dask, as_json)
+    return _go(begin(parsed, origin, out, Registry(), spec), workers, dask, as_json)
 
 
 @campaign.command()
@@ -87,7 +88,10 @@ def run(spec: str, out: Path, workers: int, dask: str | None, as_json: bool) -> 
 @dask_option
 @json_option
 def resume(folder: Path, accept: bool, retry: bool, workers: int, dask: str | None, as_json: bool) -> int:
-    """Go on with a campaign that was broken off; the result is the same as without the break."""
+    """Go on with a campaign that was broken off; the result is the same as without the break.
+
+    Its file is read again: with --accept, what was added to it is run, too. Exit codes as of run.
+    """
     found, changed = reopen(folder, Registry(), accept=accept)
     if not accept:
         refuse_changes(folder, changed)
@@ -248,9 +252,16 @@ def _go(found: Campaign, workers: int, dask: str | None, as_json: bool, *, retry
         _print_state(state, rows)
         for path in files:
             console.print(path, markup=False)
+    if missing := found.plan.spec.unpaired:
+        notes.print(f"there is no reference arm (kind none or shadow): no {', '.join(missing)}", soft_wrap=True)
     if not complete:
-        notes.print(f"the budget of wall time is used up; go on with: foreshock campaign resume {found.folder}")
-    return FAILED if any(not r.ok for r in rows) else OK
+        notes.print(
+            f"the budget of {found.plan.spec.budget.hours:g} h is used up after {len(rows)} of {len(found.plan.cases)} "
+            f"runs; go on with: foreshock campaign resume {found.folder}",
+            markup=False,
+            soft_wrap=True,
+        )
+    return FAILED if any(not r.ok for r in rows) else OK if complete else NEGATIVE
 
 
 def _state(found: Campaign, rows: list[Row], changed: list[str]) -> dict[str, Any]:
@@ -266,6 +277,8 @@ def _state(found: Campaign, rows: list[Row], changed: list[str]) -> dict[str, An
         "failed": failed,
         "simulated_h": sum(r.end_s or 0.0 for r in rows) / 3600.0,
         "changed": changed,
+        "note": found.note,
+        "aside": found.aside(),
     }
 
 
@@ -276,6 +289,10 @@ def _print_state(state: dict[str, Any], rows: list[Row]) -> None:
         f"{failed}",
         markup=False,
     )
+    if state["note"]:
+        notes.print(state["note"], markup=False, soft_wrap=True)
+    if state["aside"]:
+        console.print(f"{state['aside']} rows in the ledger are no longer part of it", markup=False)
     for line in state["changed"]:
         console.print(f"changed since it was begun: {line}", markup=False)
     for row in [r for r in rows if not r.ok][:8]:
