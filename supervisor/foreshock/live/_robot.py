@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from foreshock.clock import give_way
 from foreshock.errors import WireError
 from foreshock.guard._cdr import (
     Numbered,
@@ -99,6 +100,8 @@ class RobotLink:
         """Send what changed, and again what a guard has not acknowledged."""
         for change in decision.changes:
             self._send(change, now_ns)
+        if decision.changes:
+            give_way()  # Zenoh's thread sends; it may wait for this one's next pause, half a tick later
         again_ns = round(self._settings.resend_s * 1e9)
         for pending in self._pending.values():
             if now_ns - pending.last_ns >= again_ns:
