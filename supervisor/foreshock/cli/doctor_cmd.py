@@ -45,8 +45,8 @@ SILENT_S = 1.0
 """No robot streams more slowly."""
 COUNTED_S = 1.0
 """Samples are counted for so long, as a detector's least rate is."""
-FAULTS = ("garbage", "foreign", "backwards", "unbelieved")
-"""Samples that do not count; while some come, a stream is not fine."""
+FAULTS = ("garbage", "mistyped", "not_finite", "foreign", "repeated", "disordered", "backwards", "unbelieved")
+"""What is counted of samples that are not as they should be; while such come, a stream is not fine."""
 
 
 @click.command()
