@@ -5,7 +5,18 @@ from __future__ import annotations
 import datetime
 import time
 
-__all__ = ["NS_PER_S", "cpu_ns", "give_way", "monotonic_ns", "ns", "seconds", "sleep_until", "thread_cpu_ns", "today", "wall_ns"]
+__all__ = [
+    "NS_PER_S",
+    "cpu_ns",
+    "give_way",
+    "monotonic_ns",
+    "ns",
+    "seconds",
+    "sleep_until",
+    "thread_cpu_ns",
+    "today",
+    "wall_ns",
+]
 
 NS_PER_S = 1_000_000_000
 

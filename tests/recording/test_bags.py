@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from foreshock.cli import main
 from foreshock.config import parse_config
+from foreshock.errors import BadInputError
 from foreshock.live import load_run
 from foreshock.report.statistics import statistics_figure
 from foreshock.session.bags import replay_bag
@@ -35,8 +36,11 @@ TOPICS = """
 RATED_N_M, NORMAL_N_M, LOADED_N_M = 300.0, 120.0, 299.0
 
 
-def bag(path: Path, storage: StoragePlugin, seconds: float = 4.0, torn: tuple[int, ...] = ()) -> None:
-    """A knee that is loaded to its limit from 2 s on, as a stranger's recorder writes it; some states end early."""
+def bag(path: Path, storage: StoragePlugin, seconds: float = 4.0, torn: tuple[int, ...] = (), later_s: int = 0) -> None:
+    """A knee that is loaded to its limit from 2 s on, as a stranger's recorder writes it; some states end early.
+
+    The last message may be received ``later_s`` later.
+    """
     noise = np.random.default_rng(1)  # a sensor that repeats itself to the last bit is frozen
     store = get_typestore(Stores.ROS2_HUMBLE)
     joint, header, time = (
@@ -60,7 +64,8 @@ def bag(path: Path, storage: StoragePlugin, seconds: float = 4.0, torn: tuple[in
                 data = bytes(store.serialize_cdr(message, joint.__msgtype__))
                 if connection is states and k in torn:
                     data = data[: len(data) // 2]
-                writer.write(connection, t_ns + 500_000, data)
+                late_ns = later_s * 10**9 if k == round(seconds * 100) - 1 else 0
+                writer.write(connection, t_ns + 500_000 + late_ns, data)
             text = store.types["std_msgs/msg/String"](data="x")
             writer.write(other, t_ns, store.serialize_cdr(text, "std_msgs/msg/String"))
 
@@ -129,6 +134,14 @@ def test_messages_that_cannot_be_read_are_counted_and_end_nothing(
     assert list(result["faults"]) == ["/joint_states"]
     assert result["faults"]["/joint_states"].startswith("3 of 400 cannot be read; message 121: ")
     assert "torque-saturation" in result["first_s"]
+
+
+def test_a_gap_of_years_is_refused(tmp_path: Path) -> None:
+    """Two clocks in one bag: nobody wants a tick for each 10 ms of the years between."""
+    bag(tmp_path / "bag", StoragePlugin.MCAP, later_s=10**8)
+    config = parse_config(tomllib.loads(CONFIG.format(topics="")), "config")
+    with pytest.raises(BadInputError, match=r"after 4\.0 s is 100000000 s later \(talos/joints/command\)"):
+        replay_bag(tmp_path / "bag", config, {"/joint_states": "joints/state", "/joint_commands": "joints/command"})
 
 
 def _file(path: Path) -> Path:

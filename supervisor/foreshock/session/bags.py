@@ -23,6 +23,9 @@ from foreshock.wire import BY_ROS, message_of, stamp_of, typestore
 
 __all__ = ["BagReplay", "replay_bag"]
 
+LONGEST_GAP_S = 3600.0
+"""Without any message; every tick of it would be made."""
+
 
 class BagReplay(msgspec.Struct, frozen=True):
     """What a supervisor made of a bag.
@@ -75,7 +78,8 @@ def replay_bag(
         done: told of each decision.
 
     Raises:
-        BadInputError: no bag, or a broken one, or no topic of it is a channel that a detector reads.
+        BadInputError: no bag, or a broken one, no topic of it is a channel that a detector reads, or a gap of more than
+            LONGEST_GAP_S.
         MissingExtraError: rosbags is not installed.
     """
     supervisor = Supervisor(config, base, registry)
@@ -106,6 +110,11 @@ def replay_bag(
             if began < 0:
                 began, next_ns = sample.received_ns, sample.received_ns + period
                 supervisor.reset(0, began)
+            gap_s = (sample.received_ns - next_ns) / 1e9
+            if gap_s > LONGEST_GAP_S:
+                problem = f"the next message after {(next_ns - began) / 1e9:.1f} s is {gap_s:.0f} s later"
+                hint = f" ({sample.channel}); at most {LONGEST_GAP_S:g} s: split the bag there"
+                raise BadInputError(str(path), problem, hint)
             while sample.received_ns > next_ns:
                 tick(next_ns)
                 next_ns += period
