@@ -277,6 +277,28 @@ def test_a_torn_file_replays_up_to_where_it_is_torn(tmp_path: Path, cut: int) ->
     assert (again.ticks, again.replayed, again.complete) == (result.ticks, result.replayed, True)
 
 
+def test_what_an_operator_did_after_the_last_tick_is_recovered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("foreshock.recording._write.CHUNK_BYTES", 1)  # so that every message is in the file at once
+    supervisor = Supervisor(parse_config(CONFIG, "config"))
+    journal = McapJournal(tmp_path / "a.mcap", Head(CONFIG, "", 0, 0))
+    supervisor.reset(0)
+    for k in range(1, 4):
+        decision = supervisor.step([], k * TICK_NS)
+        journal.tick([], decision, supervisor.verdicts_of(decision))
+    journal.operator_reset(supervisor.operator_reset("jane", "looked at it", 4 * TICK_NS))
+    journal._file.flush()
+    torn, whole = tmp_path / "torn.mcap", tmp_path / "whole.mcap"
+    torn.write_bytes((tmp_path / "a.mcap").read_bytes())
+    journal.close()
+    supervisor.close()
+    recover(torn, whole)
+    memory = MemoryJournal()
+    found = [replay(path, journals=[memory]) for path in (torn, whole, tmp_path / "a.mcap")]
+    assert len({(f.ticks, f.replayed, f.agrees) for f in found}) == 1
+    assert found[1].agrees
+    assert found[1].complete
+
+
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "torn, then zeros, as after a power cut": lambda content: content[: len(content) * 2 // 3] + bytes(8192),
     "a flipped byte in its middle": lambda content: flipped(content, boundary(content) + 500),

@@ -92,7 +92,7 @@ class End(msgspec.Struct, frozen=True):
 
     Attributes:
         ticks: how many are in the file.
-        decisions: hash chain over all decisions and resets.
+        decisions: hash chain over all decisions and resets; empty (not known) where a recovered file ends in resets.
         data: hash chain over all samples, at the last tick.
         head: SHA-256 of the head, as it is written.
         left_out: what `journal recover` could not save of the file that this one was made of; empty for a run's own.

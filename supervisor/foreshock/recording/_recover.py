@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from foreshock.errors import BadInputError
-from foreshock.journal import DigestJournal
-from foreshock.recording._format import END, TICK, VERSION, End, TickRecord, sample_chain
+from foreshock.journal import DigestJournal, OperatorReset
+from foreshock.recording._format import END, RESET, TICK, VERSION, End, TickRecord, sample_chain
 from foreshock.recording._read import JournalFile
 from foreshock.recording._records import DamagedError, Records
 
@@ -52,6 +53,8 @@ def summary(path: Path) -> Summary:
 def recover(path: Path, out: Path) -> Summary:
     """Copy everything up to the last whole tick before the first damage to another file, with index and end record.
 
+    What operators did after that tick is copied, too.
+
     Raises:
         BadInputError: path is no journal, or out exists or cannot be written; no out is left then.
     """
@@ -93,6 +96,7 @@ class _Walk:
         self.last: TickRecord | None = None
         self.end: End | None = None
         self.complete = False
+        self._waiting: list[Any] = []
         self._messages: dict[str, int] = {}
         self._topics: dict[int, str] = {}
         self._schemas: dict[int, int] = {}
@@ -106,7 +110,7 @@ class _Walk:
         """
         from mcap.records import Channel, DataEnd, Message, Metadata, Schema
 
-        writer, waiting = self._writer, list[Any]()
+        writer = self._writer
         for r in self.records:
             if isinstance(r, Schema) and r.id not in self._schemas:
                 self._schemas[r.id] = writer.register_schema(r.name, r.encoding, r.data) if writer else 0
@@ -123,20 +127,24 @@ class _Walk:
                 topic = self._topics.get(r.channel_id, "")
                 if not topic:
                     raise DamagedError(self.records.path, f"has a message of no topic {self._after()}")
-                waiting.append(r)
+                self._waiting.append(r)
                 if topic == TICK:
                     self._tick(self._json(r.data, TickRecord))
                 elif topic == END:
                     self.end = self._json(r.data, End)
                 if topic in (TICK, END):
-                    self._take(waiting)
-                    waiting = []
+                    self._take(self._waiting)
+                    self._waiting = []
 
     def write_end(self, head: str, left_out: str) -> None:
         """The end record: the file's own, or that of a file that was closed after the last whole tick."""
         end = self.end
         if end is None:
+            resets = self._resets_after()
+            self._take(resets)
             digest = DigestJournal().digest if self.last is None else self.last.decisions
+            if resets:
+                digest = ""
             data = sample_chain().hexdigest() if self.last is None else self.last.data
             end = End(self.ticks, digest, data, head)
         end = msgspec.structs.replace(end, left_out=left_out)
@@ -144,6 +152,18 @@ class _Walk:
         known = [self._channels[k] for k, topic in self._topics.items() if topic == END]
         channel = known[0] if known else self._writer.register_channel(END, "json", 0)
         self._writer.add_message(channel, now_ns, msgspec.json.encode(end), now_ns, 0)
+
+    def _resets_after(self) -> list[Any]:
+        """Of operators, after the last whole tick; none if what follows is a tick that is not the next."""
+        if any(self._topics[m.channel_id] == TICK for m in self._waiting):
+            return []
+        found = []
+        for m in self._waiting:
+            if self._topics[m.channel_id] == RESET:
+                with suppress(DamagedError):
+                    self._json(m.data, OperatorReset)
+                    found.append(m)
+        return found
 
     def left_out(self, why: str, *, must_end: bool) -> str:
         """What comes after the last whole tick, for people; empty of a whole file."""
