@@ -28,7 +28,7 @@ ARMS = [
 SPEC = {
     "id": "many-arms",
     "title": "Fifteen arms",
-    "replicates": 20,
+    "replicates": 8,
     "scenarios": [
         {"use": id_ + tail} for id_ in ("a1-fall-onto-human", "a2-arm-torso-strike") for tail in ("", "-nominal")
     ],

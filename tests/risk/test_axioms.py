@@ -492,7 +492,7 @@ def test_mu_of_many_indefinite_elements_is_never_too_low(count: int, r: float) -
     assert exact - CLOSE <= found <= count + CLOSE
 
 
-@THOUSAND
+@settings(THOUSAND, max_examples=250)  # each takes 60 ms
 @given(st.lists(st.sampled_from(MANY), min_size=11, max_size=14, unique=True), parameters())
 def test_the_order_of_the_bounds_holds_for_many_elements(places: list[tuple[str, str]], p: RiskParameters) -> None:
     found = [Precursor(k, s, "ongoing", 1.0, 1.0, 1.0, i * MS, "d") for i, (k, s) in enumerate(places)]
