@@ -134,15 +134,15 @@ def pace_hz(runs: int, workers: int, runner: Callable[[Campaign], Runner]) -> fl
 
 def rows() -> list[Row]:
     """What a run costs beside the bare loop, by part; two workers beside one; a cluster beside the local engine."""
-    bare = bare_ms(RUNS)
-    whole = whole_ms(RUNS)
-    parts = parts_ms(max(RUNS // 10, 20))
+    bare, some = bare_ms(RUNS), max(RUNS // 10, 40)
+    # the machine's pace changes: the parts before and after the whole
+    before, whole, after = parts_ms(some), whole_ms(RUNS), parts_ms(some)
+    parts = {name: (before[name] + after[name]) / 2.0 for name in before}
     parts["processes"] = max(whole - sum(parts.values()), 0.0)
     other = whole - parts["plant"] - parts["detectors"]
     named = ", ".join(f"{name} {ms:.2f}" for name, ms in parts.items())
     share = other / whole
     paces: list[tuple[float, float, float]] = []
-    some = max(RUNS // 10, 40)
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         for _ in range(ROUNDS):
             one, two = (pace_hz(some, n, lambda _: run_stream) for n in (1, 2))
