@@ -154,8 +154,9 @@ def open_link(link: LinkSettings, base: Path | None = None) -> zenoh.Session:
         return zenoh.open(config)
     except zenoh.ZError as e:
         where = ", ".join((*link.listen, *link.connect))
-        why = str(e).partition(" at /")[0]  # what follows is a place in Zenoh's sources
-        raise BadInputError("link", f"cannot be opened on {where}: {why}") from None
+        why = str(e).partition(" at /")[0].strip()  # what follows is a place in Zenoh's sources
+        hint = "; does a supervisor run there? foreshock run starts one" if link.mode == "client" else ""
+        raise BadInputError("link", f"cannot be opened on {where}: {why}", hint) from None
 
 
 def ros_tokens(session: Any, keys: Keys, kind: Literal["MP", "MS"], channels: Mapping[str, str]) -> list[Any]:

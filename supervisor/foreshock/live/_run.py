@@ -88,7 +88,7 @@ class LiveSupervisor:
             self._handshakes = Handshakes(self._session, keys, self.supervisor.inputs(), channels)
             self._tokens = ros_tokens(self._session, keys, "MS", {c: ROS_NAMES[cls] for c, cls in channels.items()})
             self._token = self._session.liveliness().declare_token(keys.alive("supervisor", str(self.epoch)))
-            self._began_ns = monotonic_ns()
+            self._began_ns = self._opened_ns = monotonic_ns()
             self._digest = DigestJournal()
         except BaseException:
             self._session.close()
@@ -225,7 +225,7 @@ class LiveSupervisor:
         return Status(
             robot=self._run.config.supervisor.robot,
             epoch=self.epoch,
-            uptime_s=(now_ns - self._began_ns) / NS_PER_S,
+            uptime_s=(now_ns - self._opened_ns) / NS_PER_S,
             tick=-1 if d is None else d.tick,
             tick_ms=self._times.milliseconds(),
             overruns=self._times.overruns,
