@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import Any, TypeAlias
 
 import msgspec
@@ -14,7 +13,7 @@ from foreshock.campaign.identity import changes, digest
 from foreshock.campaign.ledger import Row
 from foreshock.campaign.outcomes import Outcomes
 from foreshock.campaign.paired import holm, mcnemar
-from foreshock.campaign.plan import Plan
+from foreshock.campaign.plan import Plan, runs_in
 from foreshock.campaign.results import Scope, scopes_of
 
 __all__ = ["LEVEL", "Change", "Comparison", "Missing", "compare"]
@@ -110,7 +109,7 @@ class _Side:
     def drawn(self, group: Group) -> tuple[Any, ...]:
         """What the runs of a group are samples of."""
         spec = self.plan.spec
-        factors = [f for f in spec.factors if any(fnmatchcase(group[0], pattern) for pattern in f.scenarios)]
+        factors = [f for f in spec.factors if runs_in(group[0], f.scenarios)]
         return self.experiment(group[0], group[2]), spec.sampler if factors else "", factors
 
 

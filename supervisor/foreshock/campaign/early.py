@@ -68,13 +68,15 @@ def to_try(plan: Plan, left: Iterable[Case], whole: Iterable[Case]) -> list[Case
             known[at] = digest([config.get("detectors"), config.get("supervisor")]) if arm.judged else ""
         return known[at]
 
-    tried = {(c.scenario, c.fault, detectors(c)) for c in whole}
+    tried: dict[tuple[str, str], set[str]] = {}
+    for case in whole:
+        tried.setdefault((case.scenario, case.fault), set()).add(detectors(case))
     found = []
     for case in sorted((c for c in left if not c.source), key=lambda c: not detectors(c)):
-        tried_with = {d for scenario, fault, d in tried if (scenario, fault) == (case.scenario, case.fault)}
+        tried_with = tried.setdefault((case.scenario, case.fault), set())
         # a run that is judged has the twin and its faults as well
         if detectors(case) not in tried_with and (detectors(case) or not tried_with):
-            tried.add((case.scenario, case.fault, detectors(case)))
+            tried_with.add(detectors(case))
             found.append(case)
     return found
 

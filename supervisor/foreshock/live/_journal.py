@@ -15,11 +15,16 @@ from foreshock.live._settings import JournalSettings
 from foreshock.recording import Head, McapJournal
 from foreshock.records import Decision, Sample
 
-__all__ = ["SegmentedJournal"]
+__all__ = ["SegmentedJournal", "segment_path"]
 
 
 SEGMENT = re.compile(r"\d+-\d{5,}\.mcap")
 """Epoch and number, after the robot's name."""
+
+
+def segment_path(folder: Path, robot: str, epoch: int, number: int) -> Path:
+    """File of a segment of a supervisor's run."""
+    return folder / f"{robot}-{epoch}-{number:05d}.mcap"
 
 
 class SegmentedJournal:
@@ -37,7 +42,7 @@ class SegmentedJournal:
     def __init__(
         self, folder: Path, robot: str, epoch: int, head: Head, settings: JournalSettings, today_s: float
     ) -> None:
-        self._folder, self._robot, self._stem = folder, robot, f"{robot}-{epoch}"
+        self._folder, self._robot, self._epoch = folder, robot, epoch
         self._head, self._settings, self._began_ns = head, settings, head.began_ns
         self._today_s = today_s
         self._segment = 0
@@ -68,7 +73,8 @@ class SegmentedJournal:
         self._file.close()
 
     def _open(self, now_ns: int) -> None:
-        self._file = McapJournal(self._folder / f"{self._stem}-{self._segment:05d}.mcap", self._head)
+        path = segment_path(self._folder, self._robot, self._epoch, self._segment)
+        self._file = McapJournal(path, self._head)
         self._retain(self._today_s + (now_ns - self._began_ns) / 1e9)
 
     def _retain(self, today_s: float) -> None:

@@ -21,7 +21,7 @@ from foreshock.live._config import RunConfig
 from foreshock.live._denied import DeniedPeers
 from foreshock.live._handshake import Handshakes
 from foreshock.live._intake import Intake
-from foreshock.live._journal import SegmentedJournal
+from foreshock.live._journal import SegmentedJournal, segment_path
 from foreshock.live._publish import decision_bytes
 from foreshock.live._robot import RobotLink
 from foreshock.live._services import MOST_PEERS, Services
@@ -66,7 +66,7 @@ class LiveSupervisor:
         base = base or Path()
         self._run, self.epoch = run, wall_ns()
         if journal is None and run.journal.folder:
-            check_writable(base / run.journal.folder / f"{run.config.supervisor.robot}-{self.epoch}-00000.mcap")
+            check_writable(segment_path(base / run.journal.folder, run.config.supervisor.robot, self.epoch, 0))
         elif journal is not None:
             check_writable(journal)
         self.supervisor = Supervisor(run.config, base, registry, epoch=self.epoch)
